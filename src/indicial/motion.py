@@ -1,0 +1,296 @@
+r"""Rigid motions of a body through still air.
+
+A motion gives the velocity ``V_b(t)`` of the moment reference point and the rate ``omega(t)``, both in body
+axes. Angle of attack is a property of V_b; the air at infinity is always at rest. A solver starts from the
+steady state of ``(velocity_before, rate_before)`` at t = 0- and follows the motion from t = 0+ on.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from indicial.conventions import Array, ReferenceQuantities, angular_frequency, flow_angles, velocity_from_angles
+from indicial.errors import InputError
+
+
+@dataclass(frozen=True)
+class FlightCondition:
+    """Steady flight: Mach number, angles and still air.
+
+    Parameters
+    ----------
+    mach : float
+    alpha, beta : float
+        Angle of attack and sideslip [rad].
+    temperature, pressure : float
+        Still air [K], [Pa]; 15 C and 1 atm if not given.
+    gamma, gas_constant : float
+        Ratio of specific heats; specific gas constant [J/(kg K)].
+    """
+
+    mach: float
+    alpha: float = 0.0
+    beta: float = 0.0
+    temperature: float = 288.15
+    pressure: float = 101325.0
+    gamma: float = 1.4
+    gas_constant: float = 287.05287
+
+    def __post_init__(self) -> None:
+        for name in ("mach", "temperature", "pressure"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise InputError(f"{name} is {value}, must be positive and finite")
+
+    @property
+    def density(self) -> float:
+        """[kg/m^3]"""
+        return self.pressure / (self.gas_constant * self.temperature)
+
+    @property
+    def speed_of_sound(self) -> float:
+        """[m/s]"""
+        return math.sqrt(self.gamma * self.gas_constant * self.temperature)
+
+    @property
+    def speed(self) -> float:
+        """True airspeed [m/s]."""
+        return self.mach * self.speed_of_sound
+
+    @property
+    def dynamic_pressure(self) -> float:
+        """[Pa]"""
+        return 0.5 * self.density * self.speed**2
+
+    @property
+    def velocity(self) -> Array:
+        """V_b [m/s], body axes, shape (3,)."""
+        return velocity_from_angles(self.speed, self.alpha, self.beta)
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Steady body rates p, q, r [rad/s], body axes."""
+
+    p: float = 0.0
+    q: float = 0.0
+    r: float = 0.0
+
+    def as_array(self) -> Array:
+        """Shape (3,)."""
+        return np.array([self.p, self.q, self.r])
+
+
+class Motion(ABC):
+    """A rigid motion: what the methods prescribe and solvers follow."""
+
+    @abstractmethod
+    def velocity(self, time: ArrayLike) -> Array:
+        """V_b [m/s], body axes, shape ``time.shape + (3,)``, for time >= 0 [s]."""
+
+    @abstractmethod
+    def rate(self, time: ArrayLike) -> Array:
+        """omega [rad/s], body axes, shape ``time.shape + (3,)``."""
+
+    @property
+    def velocity_before(self) -> Array:
+        """V_b of the steady state from which the motion starts (t = 0-), shape (3,)."""
+        return self.velocity(0.0)
+
+    @property
+    def rate_before(self) -> Array:
+        """omega of the steady state from which the motion starts (t = 0-), shape (3,)."""
+        return self.rate(0.0)
+
+    def alpha(self, time: ArrayLike) -> Array:
+        """Angle of attack [rad] at the moment reference point."""
+        return flow_angles(self.velocity(time))[1]
+
+    @abstractmethod
+    def describe(self) -> dict[str, Any]:
+        """Kind and parameters as plain values, stored with every history."""
+
+
+@dataclass(frozen=True)
+class SteadyMotion(Motion):
+    """Constant velocity and rate, from the condition."""
+
+    condition: FlightCondition
+    rates: Rates = Rates()
+
+    def velocity(self, time: ArrayLike) -> Array:
+        return np.broadcast_to(self.condition.velocity, (*np.shape(time), 3)).copy()
+
+    def rate(self, time: ArrayLike) -> Array:
+        return np.broadcast_to(self.rates.as_array(), (*np.shape(time), 3)).copy()
+
+    def describe(self) -> dict[str, Any]:
+        return {"kind": "steady", "p": self.rates.p, "q": self.rates.q, "r": self.rates.r}
+
+
+@dataclass(frozen=True)
+class AlphaStep(Motion):
+    """A jump of V_b at constant attitude: alpha changes by `amplitude` [rad] at t = 0 (no rotation)."""
+
+    condition: FlightCondition
+    amplitude: float
+
+    def velocity(self, time: ArrayLike) -> Array:
+        c = self.condition
+        after = velocity_from_angles(c.speed, c.alpha + self.amplitude, c.beta)
+        return np.broadcast_to(after, (*np.shape(time), 3)).copy()
+
+    def rate(self, time: ArrayLike) -> Array:
+        return np.zeros((*np.shape(time), 3))
+
+    @property
+    def velocity_before(self) -> Array:
+        return self.condition.velocity
+
+    def describe(self) -> dict[str, Any]:
+        return {"kind": "alpha_step", "amplitude": self.amplitude}
+
+
+@dataclass(frozen=True)
+class PitchRateStep(Motion):
+    """A jump of omega with V_b constant in body axes: q changes from 0 to `rate_amplitude` [rad/s] at t = 0."""
+
+    condition: FlightCondition
+    rate_amplitude: float
+
+    def velocity(self, time: ArrayLike) -> Array:
+        return np.broadcast_to(self.condition.velocity, (*np.shape(time), 3)).copy()
+
+    def rate(self, time: ArrayLike) -> Array:
+        return np.broadcast_to(np.array([0.0, self.rate_amplitude, 0.0]), (*np.shape(time), 3)).copy()
+
+    @property
+    def rate_before(self) -> Array:
+        return np.zeros(3)
+
+    def describe(self) -> dict[str, Any]:
+        return {"kind": "pitch_rate_step", "rate_amplitude": self.rate_amplitude}
+
+
+@dataclass(frozen=True)
+class PitchOscillation(Motion):
+    r"""``A sin(omega t)`` in pitch about the moment reference point, or one half of that motion.
+
+    - pitching about a fixed axis: alpha = alpha0 + A sin(omega t), q = A omega cos(omega t);
+    - plunging (`rotates` false): the same alpha, q = 0; isolates the alphadot derivative;
+    - pitching with alpha held (`varies_alpha` false): the same q, alpha = alpha0; isolates the q derivative.
+
+    Parameters
+    ----------
+    condition : FlightCondition
+        The mean state.
+    amplitude : float
+        A [rad].
+    omega : float
+        Angular frequency [rad/s], positive. `from_reduced_frequency` takes k instead.
+    varies_alpha, rotates : bool
+        Which half of the motion is made.
+    """
+
+    condition: FlightCondition
+    amplitude: float
+    omega: float
+    varies_alpha: bool = True
+    rotates: bool = True
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.omega) and self.omega > 0.0):
+            raise InputError(f"oscillation frequency is {self.omega} rad/s, must be positive and finite")
+        if not (math.isfinite(self.amplitude) and self.amplitude != 0.0):
+            raise InputError(f"oscillation amplitude is {self.amplitude} rad, must be finite and not zero")
+        if not (self.varies_alpha or self.rotates):
+            raise InputError("an oscillation must vary alpha, rotate, or both")
+
+    @classmethod
+    def from_reduced_frequency(
+        cls,
+        condition: FlightCondition,
+        reference: ReferenceQuantities,
+        amplitude: float,
+        k: float,
+        *,
+        varies_alpha: bool = True,
+        rotates: bool = True,
+    ) -> PitchOscillation:
+        """The oscillation at reduced frequency ``k = omega c/2U`` (Eq. 5)."""
+        omega = angular_frequency(k, condition.speed, reference.length)
+        return cls(condition, amplitude, omega, varies_alpha, rotates)
+
+    @property
+    def period(self) -> float:
+        """[s]"""
+        return 2.0 * math.pi / self.omega
+
+    def velocity(self, time: ArrayLike) -> Array:
+        t = np.asarray(time, dtype=float)
+        c = self.condition
+        alpha = c.alpha + (self.amplitude * np.sin(self.omega * t) if self.varies_alpha else np.zeros_like(t))
+        cb, sb = math.cos(c.beta), math.sin(c.beta)
+        return c.speed * np.stack([np.cos(alpha) * cb, np.full_like(alpha, sb), np.sin(alpha) * cb], axis=-1)
+
+    def rate(self, time: ArrayLike) -> Array:
+        t = np.asarray(time, dtype=float)
+        omega = np.zeros((*t.shape, 3))
+        if self.rotates:
+            omega[..., 1] = self.amplitude * self.omega * np.cos(self.omega * t)
+        return omega
+
+    def describe(self) -> dict[str, Any]:
+        kinds = {(True, True): "pitch_oscillation", (True, False): "plunge_oscillation"}
+        return {
+            "kind": kinds.get((self.varies_alpha, self.rotates), "pitch_rate_oscillation"),
+            "amplitude": self.amplitude,
+            "omega": self.omega,
+        }
+
+
+@dataclass(frozen=True)
+class TabulatedMotion(Motion):
+    """A motion given at instants, linear between them and constant outside.
+
+    Parameters
+    ----------
+    times : array_like
+        Increasing instants [s], shape (n,).
+    velocities, rates : array_like
+        V_b [m/s] and omega [rad/s], body axes, shape (n, 3).
+    """
+
+    times: Array
+    velocities: Array
+    rates: Array
+
+    def __post_init__(self) -> None:
+        t = np.asarray(self.times, dtype=float)
+        if t.ndim != 1 or t.size < 2 or not np.all(np.diff(t) > 0.0):
+            raise InputError("a tabulated motion needs at least two instants, strictly increasing")
+        for name in ("velocities", "rates"):
+            values = np.asarray(getattr(self, name), dtype=float)
+            if values.shape != (t.size, 3) or not np.all(np.isfinite(values)):
+                raise InputError(f"a tabulated motion's {name} must be finite and of shape ({t.size}, 3)")
+            object.__setattr__(self, name, values)
+        object.__setattr__(self, "times", t)
+
+    def _at(self, time: ArrayLike, table: Array) -> Array:
+        t = np.asarray(time, dtype=float)
+        return np.stack([np.interp(t, self.times, table[:, j]) for j in range(3)], axis=-1)
+
+    def velocity(self, time: ArrayLike) -> Array:
+        return self._at(time, self.velocities)
+
+    def rate(self, time: ArrayLike) -> Array:
+        return self._at(time, self.rates)
+
+    def describe(self) -> dict[str, Any]:
+        return {"kind": "tabulated", "samples": int(self.times.size)}
