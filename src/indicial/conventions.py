@@ -23,17 +23,19 @@ COEFFICIENTS = ("CA", "CY", "CN", "Cl", "Cm", "Cn")
 
 RateNormalisation = Literal["c/2V", "c/V"]
 
-_TURN = np.array([-1.0, 1.0, -1.0])
+_TURN: Array = np.array([-1.0, 1.0, -1.0])
 
 
 def mesh_from_body(vector: ArrayLike) -> Array:
     """Components in mesh axes (x aft, y right, z up) of ``(..., 3)`` vectors given in body axes."""
-    return np.asarray(vector, dtype=float) * _TURN
+    turned: Array = np.asarray(vector, dtype=float) * _TURN
+    return turned
 
 
 def body_from_mesh(vector: ArrayLike) -> Array:
     """Components in body axes (x forward, y right, z down) of ``(..., 3)`` vectors in mesh axes."""
-    return np.asarray(vector, dtype=float) * _TURN
+    turned: Array = np.asarray(vector, dtype=float) * _TURN
+    return turned
 
 
 @dataclass(frozen=True)
