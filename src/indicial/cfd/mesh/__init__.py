@@ -1,1 +1,8 @@
-"""cfd/mesh"""
+"""The face-based mesh, its generators, its checks, reading and writing."""
+
+from indicial.cfd.mesh.box import box_mesh
+from indicial.cfd.mesh.hexahedra import PatchSides
+from indicial.cfd.mesh.mesh import PATCH_KINDS, Mesh, Patch, PatchKind
+from indicial.cfd.mesh.quality import MeshReport
+
+__all__ = ["PATCH_KINDS", "Mesh", "MeshReport", "Patch", "PatchKind", "PatchSides", "box_mesh"]
