@@ -1,0 +1,101 @@
+"""What each key of a case file allows, in words: for error messages and for the documentation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Literal, get_args, get_origin
+
+from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen, MultipleOf
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from indicial.case.model import UNITS, Case, Section
+
+_TYPES = {float: "a number", int: "a whole number", str: "a text", bool: "true or false"}
+
+
+def field_at(location: tuple[str, ...]) -> FieldInfo | None:
+    """The field of a key path such as ``("shape", "fins", "count")``; None if there is none."""
+    model: type[BaseModel] | None = Case
+    field: FieldInfo | None = None
+    for part in location:
+        if model is None or part not in model.model_fields:
+            return None
+        field = model.model_fields[part]
+        model = _section(field)
+    return field
+
+
+def known_keys(location: tuple[str, ...]) -> list[str]:
+    """The keys of the table at a key path."""
+    field = field_at(location)
+    return list(Case.model_fields) if field is None else _keys(field)
+
+
+def allowed(key: str, field: FieldInfo) -> str:
+    """Type, unit and bounds of a key in words."""
+    if _section(field):
+        return f"a table [{key}] with {', '.join(_keys(field))}"
+    kind = field.annotation
+    if get_origin(kind) is Literal:
+        return " or ".join(repr(option) for option in get_args(kind))
+    unit = next((unit for end, unit in sorted(UNITS.items(), key=lambda u: -len(u[0])) if key.endswith(f"_{end}")), "")
+    words = [_TYPES.get(kind, str(kind)) if isinstance(kind, type) else str(kind)]
+    if unit:
+        words.append(f"in {unit}")
+    return " ".join([*words, " and ".join(_bounds(field.metadata))]).strip()
+
+
+def case_reference() -> str:
+    """Every key of a case file as Markdown tables, made from the models."""
+    parts = ["| key | allowed | default | meaning |\n|---|---|---|---|\n" + _row("title", Case.model_fields["title"])]
+    parts += [_tables(name, field) for name, field in Case.model_fields.items() if name != "title"]
+    return "\n\n".join(parts) + "\n"
+
+
+def _tables(path: str, field: FieldInfo) -> str:
+    model = _section(field)
+    assert model is not None
+    rows = [_row(key, inner) for key, inner in model.model_fields.items() if not _section(inner)]
+    text = (
+        f"### `[{path}]`\n\n{(model.__doc__ or '').strip()}\n\n"
+        "| key | allowed | default | meaning |\n|---|---|---|---|\n" + "\n".join(rows)
+    )
+    inner_tables = [
+        _tables(f"{path}.{key}", inner) for key, inner in model.model_fields.items() if _section(inner) is not None
+    ]
+    return "\n\n".join([text, *inner_tables])
+
+
+def _row(key: str, field: FieldInfo) -> str:
+    default = "required" if field.is_required() else f"`{field.default}`"
+    return f"| `{key}` | {allowed(key, field)} | {default} | {field.description} |"
+
+
+def _section(field: FieldInfo) -> type[Section] | None:
+    kind = field.annotation
+    return kind if isinstance(kind, type) and issubclass(kind, Section) else None
+
+
+def _keys(field: FieldInfo) -> list[str]:
+    model = _section(field)
+    return list(model.model_fields) if model else []
+
+
+def _bounds(metadata: list[Any]) -> Iterator[str]:
+    for bound in metadata:
+        match bound:
+            case Gt(gt=value):
+                yield f"greater than {value:g}"
+            case Ge(ge=value):
+                yield f"at least {value:g}"
+            case Lt(lt=value):
+                yield f"less than {value:g}"
+            case Le(le=value):
+                yield f"at most {value:g}"
+            case MultipleOf(multiple_of=value):
+                yield f"in steps of {value:g}"
+            case MinLen(min_length=value):
+                yield f"of {value} letters or more"
+            case MaxLen(max_length=value):
+                yield f"of {value} letters or fewer"

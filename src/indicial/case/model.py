@@ -1,0 +1,250 @@
+"""What a case file may say: one model a table, the unit of every quantity in its key.
+
+Every field has a description: the case-file page of the documentation is made from it, and so are error messages.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from indicial.conventions import ReferenceQuantities
+from indicial.motion import FlightCondition
+
+UNITS = {
+    "deg": "degrees",
+    "m": "metres",
+    "K": "kelvin",
+    "Pa": "pascals",
+    "kg": "kilograms",
+    "kg_m2": "kg m^2",
+    "calibres": "calibres",
+    "s": "seconds",
+    "deg_s": "degrees per second",
+}
+"""Unit of a quantity by the end of its key."""
+
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+SmallAngle = Annotated[float, Field(gt=0.0, le=5.0)]
+SmallRate = Annotated[float, Field(gt=0.0, le=0.05)]
+
+
+class Section(BaseModel):
+    """A table of a case file: strict types, no unknown keys, finite numbers."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+class Condition(Section):
+    """Steady flight through still air."""
+
+    mach: Annotated[float, Field(gt=0.0, le=10.0, description="Mach number")]
+    alpha_deg: Annotated[float, Field(gt=-90.0, lt=90.0, description="mean angle of attack")] = 0.0
+    temperature_K: Annotated[float, Field(gt=0.0, description="static temperature of the still air")] = 293.15
+    pressure_Pa: Annotated[float, Field(gt=0.0, description="static pressure of the still air")] = 101325.0
+
+
+class Fins(Section):
+    """Equal fins in a ring, flat, rectangular or tapered."""
+
+    count: Annotated[int, Field(ge=4, le=4, description="number of fins")] = 4
+    root_chord_calibres: Annotated[Positive, Field(description="chord at the body")]
+    tip_chord_calibres: Annotated[Positive, Field(description="chord at the tip")]
+    span_calibres: Annotated[Positive, Field(description="exposed span of one fin, from the body's surface")]
+    thickness_calibres: Annotated[
+        NotNegative, Field(description="thickness of the single-wedge section at its blunt trailing edge")
+    ]
+    trailing_edge_calibres: Annotated[Positive, Field(description="trailing edge, from the nose")]
+
+
+class Shape(Section):
+    """A finned body of revolution: nose, cylinder, flat base, fins."""
+
+    kind: Annotated[Literal["finned_body"], Field(description="kind of shape")]
+    diameter_m: Annotated[Positive, Field(description="calibre d: the body's diameter and reference length")]
+    nose: Annotated[Literal["cone", "ogive"], Field(description="nose type")] = "cone"
+    nose_length_calibres: Annotated[Positive, Field(description="length of the nose")]
+    length_calibres: Annotated[Positive, Field(description="length of the whole body")]
+    fins: Annotated[Fins, Field(description="the fins")]
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if self.nose_length_calibres >= self.length_calibres:
+            raise ValueError("nose_length_calibres: reaches the base; allowed: less than length_calibres")
+        if self.fins.trailing_edge_calibres > self.length_calibres:
+            raise ValueError("fins.trailing_edge_calibres: is behind the base; allowed: at most length_calibres")
+        leading = self.fins.trailing_edge_calibres - self.fins.root_chord_calibres
+        if leading < self.nose_length_calibres:
+            raise ValueError("fins.root_chord_calibres: reaches onto the nose; allowed: fins on the cylinder")
+        return self
+
+
+class Reference(Section):
+    """What coefficients refer to; length d and area pi d^2/4 follow from the shape."""
+
+    moment_reference_calibres: Annotated[
+        float, Field(description="moment reference point (centre of gravity), from the nose")
+    ]
+
+
+class Mesh(Section):
+    """Cells of the body-fitted mesh of the half model (the full model has twice as many round the body)."""
+
+    axial_cells: Annotated[int, Field(ge=20, le=2000, description="cells along the body")]
+    radial_cells: Annotated[int, Field(ge=8, le=500, description="cells from the body to the outer boundary")]
+    circumferential_cells: Annotated[
+        int, Field(ge=8, le=500, multiple_of=4, description="cells round half of the body")
+    ]
+
+
+class Flow(Section):
+    """The flow solver."""
+
+    steady_tolerance: Annotated[
+        float, Field(gt=0.0, lt=1.0, description="drop of the residual at which a steady state is taken")
+    ] = 1e-6
+    step_tolerance: Annotated[
+        float, Field(gt=0.0, lt=1.0, description="drop of the residual in each implicit time step")
+    ] = 1e-2
+
+
+class MovingFrame(Section):
+    """Steady states in the moving frame (MRF)."""
+
+    alpha_amplitude_deg: Annotated[SmallAngle, Field(description="half step of the central difference in alpha")] = 0.25
+    second_alpha_amplitude_deg: Annotated[
+        SmallAngle, Field(description="another half step in alpha: shows that the answer is linear")
+    ] = 0.5
+    pitch_rate: Annotated[SmallRate, Field(description="half step in q c/2V")] = 0.0005
+    roll_rate: Annotated[SmallRate, Field(description="p c/2V of the rolling full model")] = 0.002
+
+
+class ForcedOscillation(Section):
+    """Forced oscillation (FOM): pitching about the moment reference, and plunging."""
+
+    k: Annotated[float, Field(gt=0.0, le=2.0, description="reduced frequency omega c/2V")] = 0.1
+    amplitude_deg: Annotated[SmallAngle, Field(description="amplitude in alpha")] = 0.25
+    steps_per_period: Annotated[int, Field(ge=16, le=10000, multiple_of=2, description="time steps in a period")] = 48
+    periods: Annotated[int, Field(ge=1, le=50, description="whole periods that are reduced")] = 1
+    transient_periods: Annotated[
+        float, Field(ge=0.25, le=50.0, description="periods before them, left out (in quarters)", multiple_of=0.25)
+    ] = 0.5
+
+
+class IndicialResponse(Section):
+    """Responses to steps in alpha and in q (IRM)."""
+
+    alpha_amplitude_deg: Annotated[SmallAngle, Field(description="step in alpha, made upward and downward")] = 0.25
+    pitch_rate: Annotated[SmallRate, Field(description="step in q c/2V")] = 0.0005
+    first_step: Annotated[Positive, Field(description="first time step, in s = 2Vt/c")] = 0.05
+    growth: Annotated[float, Field(ge=1.0, le=1.5, description="ratio of neighbouring time steps, up to the last")] = (
+        1.1
+    )
+    last_step: Annotated[Positive, Field(description="largest time step, in s")] = 1.5
+    duration: Annotated[Positive, Field(description="length of the response, in s")] = 60.0
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if not self.first_step <= self.last_step < self.duration:
+            raise ValueError("last_step: is out of order; allowed: first_step <= last_step < duration")
+        return self
+
+
+class Rom(Section):
+    """The state-space model identified from the step responses."""
+
+    order: Annotated[int, Field(ge=1, le=30, description="largest number of states")] = 6
+
+
+class Vehicle(Section):
+    """Mass properties of the model in flight."""
+
+    mass_kg: Annotated[Positive, Field(description="mass")]
+    axial_inertia_kg_m2: Annotated[Positive, Field(description="moment of inertia about the body's axis, Ix")]
+    transverse_inertia_kg_m2: Annotated[Positive, Field(description="moment of inertia in pitch and yaw, Iy = Iz")]
+
+    @model_validator(mode="after")
+    def _physical(self) -> Self:
+        if self.axial_inertia_kg_m2 > 2.0 * self.transverse_inertia_kg_m2:
+            raise ValueError("axial_inertia_kg_m2: no body has it; allowed: up to twice transverse_inertia_kg_m2")
+        return self
+
+
+class Flight(Section):
+    """The free flight that is simulated and then identified."""
+
+    distance_m: Annotated[float, Field(gt=0.0, le=5000.0, description="length of the range")] = 230.0
+    initial_alpha_deg: Annotated[
+        float, Field(ge=-10.0, le=10.0, description="angle of attack at the start of the flight")
+    ] = 1.0
+    initial_beta_deg: Annotated[float, Field(ge=-10.0, le=10.0, description="sideslip at the start")] = 0.0
+    roll_rate_deg_s: Annotated[float, Field(ge=-36000.0, le=36000.0, description="roll rate at the start")] = 0.0
+
+    @model_validator(mode="after")
+    def _disturbed(self) -> Self:
+        if self.initial_alpha_deg == 0.0 and self.initial_beta_deg == 0.0:
+            raise ValueError("initial_alpha_deg: is 0, as is initial_beta_deg; allowed: one of them not 0")
+        return self
+
+
+class Range(Section):
+    """Spark-range measurements of that flight: stations, positions and angles with noise."""
+
+    stations: Annotated[int, Field(ge=10, le=1000, description="number of stations along the range")] = 54
+    position_noise_m: Annotated[Positive, Field(description="standard deviation of a measured position")] = 0.001
+    angle_noise_deg: Annotated[Positive, Field(description="standard deviation of a measured angle")] = 0.05
+    seed: Annotated[int, Field(ge=0, description="seed of the noise: the same seed, the same noise")] = 1
+
+
+class Run(Section):
+    """How the work is done; nothing here changes a result."""
+
+    workers: Annotated[int, Field(ge=1, le=256, description="processes that share the CFD runs")] = 2
+
+
+class Case(Section):
+    """A case file: from a shape to a flown, identified and checked model."""
+
+    title: Annotated[str, Field(min_length=1, max_length=120, description="what the report is headed with")]
+    condition: Annotated[Condition, Field(description="flight condition")]
+    shape: Annotated[Shape, Field(description="the body")]
+    reference: Annotated[Reference, Field(description="reference quantities")]
+    mesh: Annotated[Mesh, Field(description="the mesh")]
+    flow: Annotated[Flow, Field(description="the flow solver")] = Flow()
+    moving_frame: Annotated[MovingFrame, Field(description="moving reference frame, MRF")] = MovingFrame()
+    forced_oscillation: Annotated[ForcedOscillation, Field(description="forced oscillation, FOM")] = ForcedOscillation()
+    indicial_response: Annotated[IndicialResponse, Field(description="indicial response, IRM")] = IndicialResponse()
+    rom: Annotated[Rom, Field(description="reduced-order model")] = Rom()
+    vehicle: Annotated[Vehicle, Field(description="mass properties")]
+    flight: Annotated[Flight, Field(description="free flight")] = Flight()
+    range: Annotated[Range, Field(description="measurements of the flight")] = Range()
+    run: Annotated[Run, Field(description="how the work is done")] = Run()
+
+    @model_validator(mode="after")
+    def _solvable(self) -> Self:
+        if self.condition.mach < 1.4:
+            raise ValueError(
+                "condition.mach: is too low for a mesh that ends at the base, where all flow must leave supersonic; "
+                "allowed: at least 1.4"
+            )
+        if self.moving_frame.alpha_amplitude_deg == self.moving_frame.second_alpha_amplitude_deg:
+            raise ValueError("moving_frame.second_alpha_amplitude_deg: equals the first; allowed: another amplitude")
+        if not 0.0 < self.reference.moment_reference_calibres < self.shape.length_calibres:
+            raise ValueError("reference.moment_reference_calibres: is off the body; allowed: 0 to length_calibres")
+        return self
+
+    @property
+    def flight_condition(self) -> FlightCondition:
+        """The flight condition, in SI units and radians."""
+        c = self.condition
+        return FlightCondition(c.mach, math.radians(c.alpha_deg), 0.0, c.temperature_K, c.pressure_Pa)
+
+    @property
+    def reference_quantities(self) -> ReferenceQuantities:
+        """Length d, area pi d^2/4, moment reference point; rates per c/2V."""
+        d = self.shape.diameter_m
+        x = self.reference.moment_reference_calibres * d
+        return ReferenceQuantities(d, math.pi * d * d / 4.0, (x, 0.0, 0.0))
