@@ -1,0 +1,285 @@
+r"""The finite-volume solver behind the solver protocol: motion in, history out."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from indicial import __version__
+from indicial.cfd.field import FlowField
+from indicial.cfd.flow.gas import GAMMA
+from indicial.cfd.flow.grid import SYMMETRY, Grid
+from indicial.cfd.flow.residual import MeshMotion, Residual
+from indicial.cfd.march.checkpoint import Checkpoint
+from indicial.cfd.march.ilu import Pattern
+from indicial.cfd.march.steady import Progress, SteadyState, converge
+from indicial.cfd.march.unsteady import march
+from indicial.cfd.mesh import Mesh
+from indicial.conventions import Array, ReferenceQuantities, mesh_from_body
+from indicial.errors import InputError
+from indicial.history import History
+from indicial.motion import FlightCondition, Motion, Rates, SteadyMotion
+from indicial.solver import SteadyLoads
+
+log = logging.getLogger(__name__)
+
+AMBIENT_PRESSURE = 1.0 / GAMMA
+
+
+@dataclass(frozen=True)
+class FlowSettings:
+    """Tolerances of the finite-volume solver.
+
+    Parameters
+    ----------
+    steady_tolerance : float
+        Residual of a steady state relative to that of still air under the same motion.
+    steady_iterations : int
+        Newton steps allowed to reach it.
+    unsteady_tolerance : float
+        Residual left by each time step relative to the largest change that the motion makes to the residual.
+    """
+
+    steady_tolerance: float = 1e-9
+    steady_iterations: int = 120
+    unsteady_tolerance: float = 2e-4
+
+    def __post_init__(self) -> None:
+        for name in ("steady_tolerance", "unsteady_tolerance"):
+            if not 0.0 < getattr(self, name) < 1.0:
+                raise InputError(f"{name} is {getattr(self, name)}, must lie between 0 and 1")
+
+
+class FiniteVolumeSolver:
+    """Euler equations in still-air moving-body form on one mesh; satisfies `indicial.solver.Solver`.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Wall patches carry the loads. A mesh whose symmetry patches close a half body (plane y = 0) gives the loads
+        of the whole body; one layer between two symmetry patches is a two-dimensional flow, with `reference.area`
+        the chord times the layer's thickness.
+    reference : ReferenceQuantities
+    settings : FlowSettings
+    folder : Path, optional
+        Where converged steady states and the checkpoints of running marches are kept, so that a killed run
+        resumes; without it they live in memory only.
+    progress : callable, optional
+        Told the fraction of the running computation that is done.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        reference: ReferenceQuantities,
+        settings: FlowSettings | None = None,
+        *,
+        folder: Path | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        self.mesh = mesh
+        self.settings = settings if settings is not None else FlowSettings()
+        self._reference = reference
+        self._folder = folder
+        self._progress = progress
+        self.grid = Grid.from_mesh(mesh, reference)
+        self._residual = Residual(self.grid)
+        self._pattern = Pattern.of(self.grid)
+        self._states: dict[str, SteadyState] = {}
+        self._mirrored = _is_half_body(self.grid)
+        self._mesh_key = hashlib.sha256(mesh.points.tobytes() + mesh.owner.tobytes()).hexdigest()[:16]
+
+    @property
+    def reference(self) -> ReferenceQuantities:
+        """What the loads are made dimensionless with."""
+        return self._reference
+
+    def steady(self, condition: FlightCondition, rates: Rates = Rates()) -> SteadyLoads:
+        """Loads of the steady state at constant velocity and body rates.
+
+        Raises
+        ------
+        InputError
+            If the motion crosses the mesh's symmetry plane or the gas is not the solver's.
+        DivergenceError
+            If the flow does not converge.
+        """
+        motion = SteadyMotion(condition, rates)
+        state = self._state(condition, motion.velocity(0.0), motion.rate(0.0))
+        self._residual(state.q, state.motion)
+        coefficients = self._coefficients(*self._residual.forces(AMBIENT_PRESSURE), condition)
+        convergence: dict[str, float | int | str] = {
+            "residual": float(state.residuals[-1]),
+            "iterations": len(state.residuals) - 1,
+            "jacobian_products": state.products,
+            "cells": self.grid.n_cells,
+        }
+        return SteadyLoads(coefficients, condition, rates, self._reference, convergence)
+
+    def unsteady(self, condition: FlightCondition, motion: Motion, times: ArrayLike) -> History:
+        """Loads at `times` [s], the steps of the march, from the steady state of the motion at t = 0-.
+
+        Raises
+        ------
+        InputError
+            If `times` does not start at 0 and increase, or the motion crosses the symmetry plane.
+        DivergenceError
+            If a step cannot be solved; says where and when.
+        """
+        t = np.asarray(times, dtype=float)
+        if t.ndim != 1 or t.size < 2 or t[0] != 0.0 or not np.all(np.diff(t) > 0.0):
+            raise InputError("times must start at 0 and increase strictly, with at least two of them")
+        velocity, rate = motion.velocity(t), motion.rate(t)
+        unit = condition.speed_of_sound / self._reference.length
+        before = self._mesh_motion(condition, motion.velocity_before, motion.rate_before)
+
+        def motion_at(time: float) -> MeshMotion:
+            if time < 0.0:
+                return before
+            return self._mesh_motion(condition, motion.velocity(time / unit), motion.rate(time / unit))
+
+        for m in np.unique(np.linspace(0, t.size - 1, 50).astype(int)):
+            self._check_symmetry(motion_at(float(t[m] * unit)))
+        start = self._state(condition, motion.velocity_before, motion.rate_before)
+        self._residual(start.q, start.motion)
+        initial = self._coefficients(*self._residual.forces(AMBIENT_PRESSURE), condition)
+        checkpoint = None
+        if self._folder is not None:
+            key = self._key(condition, velocity, rate, t, self.settings.unsteady_tolerance)
+            checkpoint = Checkpoint(self._folder / f"march-{key}.npz", key)
+        result = march(
+            self._residual,
+            self._pattern,
+            start.q,
+            motion_at,
+            t * unit,
+            tolerance=self.settings.unsteady_tolerance,
+            checkpoint=checkpoint,
+            progress=self._progress,
+            ambient_pressure=AMBIENT_PRESSURE,
+        )
+        return History(
+            time=t,
+            coefficients=self._coefficients(result.forces, result.moments, condition),
+            velocity=velocity,
+            rate=rate,
+            before=initial,
+            condition=condition,
+            reference=self._reference,
+            motion=motion.describe(),
+            provenance={
+                "solver": "finite volume, Euler, second order",
+                "version": __version__,
+                "mesh": self._mesh_key,
+                "cells": self.grid.n_cells,
+                "jacobian_products": result.products,
+                "newton_steps": result.newton_steps,
+                "worst_step_residual": result.worst_residual,
+            },
+        )
+
+    def field(self, condition: FlightCondition, rates: Rates = Rates()) -> FlowField:
+        """The steady flow itself, for pictures and checks."""
+        motion = SteadyMotion(condition, rates)
+        state = self._state(condition, motion.velocity(0.0), motion.rate(0.0))
+        self._residual(state.q, state.motion)
+        return FlowField.of(self.mesh, self.grid, self._reference, condition, state, self._residual.face_flux)
+
+    def convergence(self, condition: FlightCondition, rates: Rates = Rates()) -> Array:
+        """Residual after each Newton step of a steady state, relative to that of still air under the motion."""
+        motion = SteadyMotion(condition, rates)
+        return self._state(condition, motion.velocity(0.0), motion.rate(0.0)).residuals
+
+    def _mesh_motion(self, condition: FlightCondition, velocity: Array, rate: Array) -> MeshMotion:
+        """V_b and omega in solver units and mesh axes."""
+        sound = condition.speed_of_sound
+        return MeshMotion(mesh_from_body(velocity) / sound, mesh_from_body(rate) * self._reference.length / sound)
+
+    def _check_symmetry(self, motion: MeshMotion) -> None:
+        """A mirrored half cannot move through its own mirror."""
+        g = self.grid
+        faces = g.n_interior + np.flatnonzero(g.kind == SYMMETRY)
+        through = g.normal[faces] @ motion.velocity + (g.moment[faces] @ motion.omega) / g.area[faces]
+        if faces.size and np.max(np.abs(through)) > 1e-9:
+            raise InputError("the motion crosses the mesh's symmetry plane: p, r and beta need the full mesh")
+
+    def _state(self, condition: FlightCondition, velocity: Array, rate: Array) -> SteadyState:
+        """The steady state under a constant motion, from memory, from the folder, or computed."""
+        if condition.gamma != GAMMA:
+            raise InputError(f"gamma is {condition.gamma}, the finite-volume solver has {GAMMA}")
+        motion = self._mesh_motion(condition, velocity, rate)
+        self._check_symmetry(motion)
+        key = self._key(motion.velocity, motion.omega, self.settings.steady_tolerance)
+        if key not in self._states:
+            stored = self._stored(key)
+            checkpoint = stored.load() if stored is not None else None
+            if checkpoint is not None:
+                found = SteadyState(checkpoint["q"], motion, checkpoint["residuals"], int(checkpoint["products"]))
+            else:
+                found = converge(
+                    self._residual,
+                    self._pattern,
+                    motion,
+                    self._nearest(motion),
+                    tolerance=self.settings.steady_tolerance,
+                    iterations=self.settings.steady_iterations,
+                    progress=self._progress,
+                )
+                if stored is not None:
+                    stored.save(q=found.q, residuals=found.residuals, products=np.array(found.products))
+            self._states[key] = found
+        return self._states[key]
+
+    def _stored(self, key: str) -> Checkpoint | None:
+        return None if self._folder is None else Checkpoint(self._folder / f"steady-{key}.npz", key)
+
+    def start_from(self, condition: FlightCondition, rates: Rates = Rates()) -> None:
+        """Have the steady state of a condition at hand, so that later ones start near it."""
+        motion = SteadyMotion(condition, rates)
+        self._state(condition, motion.velocity(0.0), motion.rate(0.0))
+
+    def _nearest(self, motion: MeshMotion) -> Array | None:
+        """The known state of the closest motion, if it is close enough for Newton's iteration."""
+
+        def distance(state: SteadyState) -> float:
+            change = np.linalg.norm(state.motion.velocity - motion.velocity)
+            return float((change + np.linalg.norm(state.motion.omega - motion.omega)) / np.linalg.norm(motion.velocity))
+
+        known = sorted(self._states.values(), key=distance)
+        return known[0].q if known and distance(known[0]) < 0.1 else None
+
+    def _coefficients(self, force: Array, moment: Array, condition: FlightCondition) -> Array:
+        """(CA, CY, CN, Cl, Cm, Cn), shape (..., 6), from loads in solver units and mesh axes."""
+        c = self._reference.length
+        pressure_area = 0.5 * condition.mach**2 * self._reference.area / c**2
+        arms = self._reference.moment_lengths / c
+        out = np.concatenate([force, moment * [-1.0, 1.0, -1.0] / arms], axis=-1) / pressure_area
+        if self._mirrored:
+            out = out * [2.0, 0.0, 2.0, 0.0, 2.0, 0.0]
+        return np.asarray(out)
+
+    def _key(self, *parts: object) -> str:
+        """A name for a computation on this mesh."""
+        digest = hashlib.sha256(self._mesh_key.encode())
+        digest.update(repr(sorted(self._reference.to_dict().items())).encode())
+        digest.update(__version__.encode())
+        for part in parts:
+            if isinstance(part, np.ndarray):
+                digest.update(np.ascontiguousarray(part).tobytes())
+            elif isinstance(part, FlightCondition):
+                digest.update(repr(asdict(part)).encode())
+            else:
+                digest.update(repr(part).encode())
+        return digest.hexdigest()[:20]
+
+
+def _is_half_body(grid: Grid) -> bool:
+    """Whether the symmetry faces do not balance: one plane, not the two sides of a layer."""
+    faces = grid.n_interior + np.flatnonzero(grid.kind == SYMMETRY)
+    areas = grid.normal[faces] * grid.area[faces, None]
+    return bool(faces.size and np.linalg.norm(areas.sum(axis=0)) > 1e-6 * grid.area[faces].sum())

@@ -1,0 +1,122 @@
+"""A mesh made ready for the flow kernels: lengths in reference lengths, tables from cells to faces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from indicial.cfd.flow.reconstruction import least_squares_weights
+from indicial.cfd.mesh import Mesh
+from indicial.conventions import Array, ReferenceQuantities
+from indicial.errors import InputError
+
+Index = NDArray[np.int32]
+
+SLIP_WALL, FARFIELD, OUTFLOW, SYMMETRY = range(4)
+KINDS = {"wall": SLIP_WALL, "farfield": FARFIELD, "outflow": OUTFLOW, "symmetry": SYMMETRY}
+
+
+@dataclass(frozen=True)
+class Grid:
+    """What the kernels read. Lengths are in reference lengths, the origin is the moment reference point.
+
+    Parameters
+    ----------
+    owner, neighbour : ndarray
+        Cells of the faces (nf,), (ni,); interior faces come first.
+    kind : ndarray
+        Boundary kind of each face behind the interior ones (nf - ni,).
+    normal, area, moment : ndarray
+        Unit normals (nf, 3), areas (nf,), ``M_f = integral of r x dA`` (nf, 3).
+    to_owner, to_neighbour : ndarray
+        Face centre less the cell centre (nf, 3), (ni, 3).
+    volume : ndarray
+        (nc,).
+    offsets, faces, signs, cells, weights : ndarray
+        Cell-to-face table in rows: face, +1 where the cell owns it else -1, neighbour cell or -1, and the
+        least-squares weight of that neighbour.
+    softening : ndarray
+        The limiter's eps of each interior face (ni,).
+    wall_faces : ndarray
+        Faces whose loads count.
+    """
+
+    owner: Index
+    neighbour: Index
+    kind: NDArray[np.int8]
+    normal: Array
+    area: Array
+    moment: Array
+    to_owner: Array
+    to_neighbour: Array
+    volume: Array
+    offsets: Index
+    faces: Index
+    signs: NDArray[np.int8]
+    cells: Index
+    weights: Array
+    softening: Array
+    wall_faces: Index
+
+    @property
+    def n_cells(self) -> int:
+        """Number of cells."""
+        return len(self.volume)
+
+    @property
+    def n_interior(self) -> int:
+        """Number of interior faces."""
+        return len(self.neighbour)
+
+    @classmethod
+    def from_mesh(cls, mesh: Mesh, reference: ReferenceQuantities) -> Grid:
+        """Scale, shift and tabulate `mesh`.
+
+        Raises
+        ------
+        InputError
+            If a cell's volume is not positive or a patch is of a kind the solver does not know.
+        """
+        bad = np.flatnonzero(~(mesh.cell_volume > 0.0))
+        if bad.size:
+            raise InputError(f"{bad.size} of {mesh.n_cells} mesh cells have no positive volume, the first is {bad[0]}")
+        c = reference.length
+        origin = np.asarray(reference.moment_reference)
+        area = np.linalg.norm(mesh.face_area, axis=1)
+        ni = mesh.n_interior
+        owner, neighbour = mesh.owner, mesh.neighbour
+        kind = np.empty(mesh.n_faces - ni, dtype=np.int8)
+        for patch in mesh.patches:
+            if patch.kind not in KINDS:
+                raise InputError(f"patch {patch.name} is of kind {patch.kind!r}, must be one of {', '.join(KINDS)}")
+            kind[patch.start - ni : patch.stop - ni] = KINDS[patch.kind]
+
+        cell = np.concatenate([owner, neighbour])
+        order = np.argsort(cell, kind="stable")
+        offsets = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=mesh.n_cells))])
+        face = np.concatenate([np.arange(mesh.n_faces), np.arange(ni)])[order]
+        sign = np.concatenate([np.ones(mesh.n_faces), -np.ones(ni)])[order].astype(np.int8)
+        other = np.concatenate([neighbour, np.full(mesh.n_faces - ni, -1), owner[:ni]])[order]
+        centres = mesh.cell_centre / c
+        h = np.linalg.norm(centres[neighbour] - centres[owner[:ni]], axis=1)
+        walls = [np.arange(p.start, p.stop) for p in mesh.patches if p.kind == "wall"]
+        return cls(
+            owner=owner.astype(np.int32),
+            neighbour=neighbour.astype(np.int32),
+            kind=kind,
+            normal=mesh.face_area / area[:, None],
+            area=area / c**2,
+            moment=(mesh.face_moment - np.cross(origin, mesh.face_area)) / c**3,
+            to_owner=mesh.face_centre / c - centres[owner],
+            to_neighbour=mesh.face_centre[:ni] / c - centres[neighbour],
+            volume=mesh.cell_volume / c**3,
+            offsets=offsets.astype(np.int32),
+            faces=face.astype(np.int32),
+            signs=sign,
+            cells=other.astype(np.int32),
+            weights=least_squares_weights(owner[:ni], neighbour, centres, offsets, other),
+            softening=h**3,
+            wall_faces=np.concatenate(walls).astype(np.int32) if walls else np.empty(0, dtype=np.int32),
+        )

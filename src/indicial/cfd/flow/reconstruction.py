@@ -1,0 +1,73 @@
+r"""Second-order reconstruction: least-squares gradients and a smooth face limiter.
+
+A face between cells i and j with centres ``d`` apart takes from cell i, variable by variable,
+
+    q_L = q_i + psi(a, b) g_i . r,     b = q_j - q_i,     a = 2 g_i . d - b,
+    psi = 2 (max(a b, 0) + eps) / (a^2 + b^2 + 2 eps)
+
+with r from the cell's centre to the face's. On a straight line of cells a and b are the differences behind and
+ahead and psi g.d is the limited slope of van Albada, van Leer & Roberts (1982). ``eps = (h/c)^3``, h the cell
+spacing, leaves smooth extrema alone (Venkatakrishnan 1995). Density and pressure increments pass through
+``x / sqrt(1 + (x / (beta q))^2)``, which keeps them positive and is exact to third order.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from indicial.conventions import Array
+
+SATURATION = 0.8
+"""beta: the largest part of its cell value by which density or pressure may change towards a face."""
+
+
+def least_squares_weights(owner: Array, neighbour: Array, centres: Array, offsets: Array, cells: Array) -> Array:
+    """Weights w of ``grad q = sum_k w_k (q_k - q)`` over face neighbours, exact for linear fields.
+
+    Parameters
+    ----------
+    owner, neighbour : ndarray
+        Interior faces' cells.
+    centres : ndarray
+        Cell centres (nc, 3).
+    offsets, cells : ndarray
+        Rows of the cell-to-face table: neighbour cell of each entry, -1 on the boundary.
+
+    Returns
+    -------
+    ndarray
+        (entries, 3), zero on boundary entries. Directions in which a cell has no neighbours (the thickness of a
+        one-layer mesh) get no gradient.
+    """
+    rows = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+    inside = cells >= 0
+    d = np.where(inside[:, None], centres[cells] - centres[rows], 0.0)
+    square = np.sum(d * d, axis=1)
+    w = np.divide(1.0, square, out=np.zeros_like(square), where=square > 0.0)
+    normal = np.zeros((len(offsets) - 1, 3, 3))
+    np.add.at(normal, rows, w[:, None, None] * d[:, :, None] * d[:, None, :])
+    inverse = np.linalg.pinv(normal, rcond=1e-6, hermitian=True)
+    weights: Array = np.einsum("nij,nj->ni", inverse[rows], w[:, None] * d)
+    return weights
+
+
+@njit(cache=True, inline="always", error_model="numpy")
+def limiter(a, b, eps):  # type: ignore[no-untyped-def]
+    """psi(a, b) and its two slopes."""
+    den = a * a + b * b + 2.0 * eps
+    ab = a * b
+    if ab > 0.0:
+        psi = 2.0 * (ab + eps) / den
+        return psi, (2.0 * b - 2.0 * a * psi) / den, (2.0 * a - 2.0 * b * psi) / den
+    psi = 2.0 * eps / den
+    return psi, -2.0 * a * psi / den, -2.0 * b * psi / den
+
+
+@njit(cache=True, inline="always", error_model="numpy")
+def saturate(x, q):  # type: ignore[no-untyped-def]
+    """``x / sqrt(1 + (x/(beta q))^2)`` and its slopes in x and q."""
+    t = x / (SATURATION * q)
+    root = 1.0 / np.sqrt(1.0 + t * t)
+    cube = root * root * root
+    return x * root, cube, x * t * t / q * cube

@@ -1,0 +1,177 @@
+r"""Incomplete block factorisation of the compact Jacobian, on its own pattern: block ILU(0).
+
+The preconditioner of every implicit solve. With cells numbered downstream it is nearly a direct solver where the
+flow is supersonic. Factors are kept in single precision: they only precondition.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from indicial.cfd.flow.grid import Grid, Index
+from indicial.conventions import Array
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """Block-sparse rows of the compact Jacobian: sorted columns, and where each face's entry goes.
+
+    Parameters
+    ----------
+    indptr, indices : ndarray
+        Rows and sorted columns.
+    diagonal : ndarray
+        Slot of each diagonal block (nc,).
+    slots : ndarray
+        Slot of each entry of the grid's cell-to-face table, -1 on the boundary.
+    """
+
+    indptr: Index
+    indices: Index
+    diagonal: Index
+    slots: Index
+
+    @classmethod
+    def of(cls, grid: Grid) -> Pattern:
+        """The pattern of a grid's nearest neighbours."""
+        n = grid.n_cells
+        rows = np.repeat(np.arange(n), np.diff(grid.offsets))
+        inside = grid.cells >= 0
+        i = np.concatenate([np.arange(n), rows[inside]])
+        j = np.concatenate([np.arange(n), grid.cells[inside]])
+        order = np.lexsort((j, i))
+        place = np.empty(len(order), dtype=np.int32)
+        place[order] = np.arange(len(order))
+        slots = np.full(len(rows), -1, dtype=np.int32)
+        slots[inside] = place[n:]
+        indptr = np.concatenate([[0], np.cumsum(np.bincount(i, minlength=n))]).astype(np.int32)
+        return cls(indptr, j[order].astype(np.int32), place[:n], slots)
+
+
+@njit(cache=True, error_model="numpy")
+def _invert(a, out):  # type: ignore[no-untyped-def]
+    """Inverse of a 5 x 5 block by Gauss-Jordan with partial pivoting; false if it is singular."""
+    m = a.copy()
+    for i in range(5):
+        for j in range(5):
+            out[i, j] = 1.0 if i == j else 0.0
+    for c in range(5):
+        p = c
+        for i in range(c + 1, 5):
+            if abs(m[i, c]) > abs(m[p, c]):
+                p = i
+        if not abs(m[p, c]) > 0.0:
+            return False
+        if p != c:
+            for j in range(5):
+                m[c, j], m[p, j] = m[p, j], m[c, j]
+                out[c, j], out[p, j] = out[p, j], out[c, j]
+        d = 1.0 / m[c, c]
+        for j in range(5):
+            m[c, j] *= d
+            out[c, j] *= d
+        for i in range(5):
+            if i != c:
+                t = m[i, c]
+                if t != 0.0:
+                    for j in range(5):
+                        m[i, j] -= t * m[c, j]
+                        out[i, j] -= t * out[c, j]
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _factorise(blocks, indptr, indices, diagonal):  # type: ignore[no-untyped-def]
+    """Factors in place; diagonal blocks are left inverted. Returns the row of a singular block, or -1."""
+    n = indptr.shape[0] - 1
+    place = np.full(n, -1, dtype=np.int32)
+    product = np.empty((5, 5))
+    inverse = np.empty((5, 5))
+    for i in range(n):
+        for s in range(indptr[i], indptr[i + 1]):
+            place[indices[s]] = s
+        for s in range(indptr[i], diagonal[i]):
+            k = indices[s]
+            d = blocks[diagonal[k]]
+            for a in range(5):
+                for b in range(5):
+                    t = 0.0
+                    for m in range(5):
+                        t += blocks[s, a, m] * d[m, b]
+                    product[a, b] = t
+            blocks[s] = product
+            for u in range(diagonal[k] + 1, indptr[k + 1]):
+                target = place[indices[u]]
+                if target >= 0:
+                    for a in range(5):
+                        for b in range(5):
+                            t = 0.0
+                            for m in range(5):
+                                t += product[a, m] * blocks[u, m, b]
+                            blocks[target, a, b] -= t
+        for s in range(indptr[i], indptr[i + 1]):
+            place[indices[s]] = -1
+        if not _invert(blocks[diagonal[i]], inverse):
+            return i
+        blocks[diagonal[i]] = inverse
+    return -1
+
+
+@njit(cache=True, error_model="numpy", fastmath=True)
+def _solve(blocks, indptr, indices, diagonal, b, x):  # type: ignore[no-untyped-def]
+    """x = U^-1 L^-1 b."""
+    n = indptr.shape[0] - 1
+    for i in range(n):
+        y0, y1, y2, y3, y4 = b[i, 0], b[i, 1], b[i, 2], b[i, 3], b[i, 4]
+        for s in range(indptr[i], diagonal[i]):
+            j = indices[s]
+            for m in range(5):
+                v = x[j, m]
+                y0 -= blocks[s, 0, m] * v
+                y1 -= blocks[s, 1, m] * v
+                y2 -= blocks[s, 2, m] * v
+                y3 -= blocks[s, 3, m] * v
+                y4 -= blocks[s, 4, m] * v
+        x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4] = y0, y1, y2, y3, y4
+    for i in range(n - 1, -1, -1):
+        y0, y1, y2, y3, y4 = x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4]
+        for s in range(diagonal[i] + 1, indptr[i + 1]):
+            j = indices[s]
+            for m in range(5):
+                v = x[j, m]
+                y0 -= blocks[s, 0, m] * v
+                y1 -= blocks[s, 1, m] * v
+                y2 -= blocks[s, 2, m] * v
+                y3 -= blocks[s, 3, m] * v
+                y4 -= blocks[s, 4, m] * v
+        d = blocks[diagonal[i]]
+        for a in range(5):
+            x[i, a] = d[a, 0] * y0 + d[a, 1] * y1 + d[a, 2] * y2 + d[a, 3] * y3 + d[a, 4] * y4
+
+
+class BlockILU:
+    """``M^-1`` of a block-sparse matrix, applied to states (nc, 5).
+
+    Raises
+    ------
+    ZeroDivisionError
+        If a diagonal block becomes singular.
+    """
+
+    def __init__(self, pattern: Pattern, blocks: Array) -> None:
+        self.pattern = pattern
+        row = _factorise(blocks, pattern.indptr, pattern.indices, pattern.diagonal)
+        if row >= 0:
+            raise ZeroDivisionError(f"singular diagonal block of cell {row}")
+        self._factors: NDArray[np.float32] = blocks.astype(np.float32)
+
+    def solve(self, b: Array) -> Array:
+        """``M^-1 b``."""
+        x = np.empty_like(b)
+        p = self.pattern
+        _solve(self._factors, p.indptr, p.indices, p.diagonal, b, x)
+        return x
