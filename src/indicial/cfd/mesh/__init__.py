@@ -3,6 +3,7 @@
 from indicial.cfd.mesh.box import box_mesh
 from indicial.cfd.mesh.hexahedra import PatchSides
 from indicial.cfd.mesh.mesh import PATCH_KINDS, Mesh, Patch, PatchKind
+from indicial.cfd.mesh.plate import plate_mesh
 from indicial.cfd.mesh.quality import MeshReport
 
-__all__ = ["PATCH_KINDS", "Mesh", "MeshReport", "Patch", "PatchKind", "PatchSides", "box_mesh"]
+__all__ = ["PATCH_KINDS", "Mesh", "MeshReport", "Patch", "PatchKind", "PatchSides", "box_mesh", "plate_mesh"]

@@ -13,14 +13,14 @@ _OPENFOAM_TYPE: dict[PatchKind, str] = {
     "wall": "wall",
     "farfield": "patch",
     "outflow": "patch",
-    "symmetry": "symmetryPlane",
+    "symmetry": "symmetry",
 }
 
 
 def write_polymesh(mesh: Mesh, folder: str | Path) -> None:
     """Write ``points``, ``faces``, ``owner``, ``neighbour`` and ``boundary`` into `folder`, in ASCII.
 
-    Walls become ``wall``, symmetry planes ``symmetryPlane``, the rest ``patch``; names are kept.
+    Walls become ``wall``, symmetry planes ``symmetry``, the rest ``patch``; names are kept.
     """
     target = Path(folder)
     note = f"nPoints:{mesh.n_points} nCells:{mesh.n_cells} nFaces:{mesh.n_faces} nInternalFaces:{mesh.n_interior}"
