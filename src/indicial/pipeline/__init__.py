@@ -1,0 +1,1 @@
+"""The main job: a case file through all stages, resumable."""

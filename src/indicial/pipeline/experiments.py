@@ -1,0 +1,273 @@
+r"""CFD experiments in worker processes, each kept in a file of its own.
+
+`ExperimentPool` is a solver: the methods run on it as on any other. What they ask for (a steady state, a history under
+a motion) is looked up among the kept results, and computed by a worker process only if it is not there. That is how
+a run resumes, how its experiments share the cores, and how two methods share one result.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import math
+import multiprocessing
+import os
+import re
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Protocol, Self, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from indicial import __version__
+from indicial.conventions import Array, ReferenceQuantities
+from indicial.errors import DivergenceError, IndicialError
+from indicial.files import write_text
+from indicial.history import History
+from indicial.motion import FlightCondition, Motion, Rates, SteadyMotion
+from indicial.solver import Solver, SteadyLoads
+
+log = logging.getLogger(__name__)
+
+Fraction = Callable[[float], None]
+"""Told the fraction of one experiment that is done, 0 to 1."""
+
+Watch = Callable[[str, float], None]
+"""Told an experiment's label and the fraction of it that is done."""
+
+
+class SolverFactory(Protocol):
+    """Builds solvers in a worker process; must be picklable."""
+
+    def key(self) -> str:
+        """What a result depends on beside the motion: mesh, reference, settings."""
+        ...
+
+    def build(self, whole: bool, progress: Fraction) -> Solver:
+        """A solver on the whole model, or on the half whose mirror image is the rest."""
+        ...
+
+
+@runtime_checkable
+class TellsConvergence(Protocol):
+    """A solver that can show how a steady state converged."""
+
+    def convergence(self, condition: FlightCondition, rates: Rates = ...) -> Array:
+        """Residual after each iteration, shape (n,)."""
+        ...
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One thing to ask a solver: a steady state (no `times`), or the loads at `times` under a motion."""
+
+    condition: FlightCondition
+    motion: Motion
+    times: Array | None
+    whole: bool
+    label: str
+    key: str
+
+    @property
+    def file_name(self) -> str:
+        """Name of its result file: what it is, and the start of its key."""
+        slug = re.sub(r"[^a-z0-9.+-]+", "_", self.label.lower()).strip("_")
+        return f"{slug}-{self.key[:8]}.{'json' if self.times is None else 'nc'}"
+
+
+def describe_experiment(
+    factory_key: str, condition: FlightCondition, motion: Motion, times: Array | None
+) -> Experiment:
+    """The experiment with its label and key; steady if `times` is None."""
+    instants = np.zeros(1) if times is None else times
+    velocity, rate = motion.velocity(instants), motion.rate(instants)
+    moves = (velocity, rate, motion.velocity_before, motion.rate_before)
+    lateral = [velocity[:, 1], rate[:, 0], rate[:, 2], motion.velocity_before[1:2], motion.rate_before[[0, 2]]]
+    digest = hashlib.sha256(repr((__version__, factory_key, times is None, asdict(condition))).encode())
+    for array in (instants, *moves):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return Experiment(
+        condition=condition,
+        motion=motion,
+        times=times,
+        whole=any(bool(np.any(component != 0.0)) for component in lateral),
+        label=_label(condition, motion, times is None),
+        key=digest.hexdigest(),
+    )
+
+
+def _label(condition: FlightCondition, motion: Motion, steady: bool) -> str:
+    described = motion.describe()
+    parts = [str(described["kind"]).replace("_", " ")]
+    if steady:
+        parts.append(f"alpha {math.degrees(condition.alpha):.4g} deg")
+    for name, value in described.items():
+        if name == "amplitude":
+            parts.append(f"{math.degrees(value):+.4g} deg")
+        elif name in ("p", "q", "r", "rate_amplitude") and value:
+            parts.append(f"{'' if name == 'rate_amplitude' else name + ' '}{value:+.4g} rad/s")
+    return " ".join(parts)
+
+
+class ExperimentPool:
+    """A solver whose experiments run in worker processes and are kept in files.
+
+    Safe to call from several threads at once, one for each method: that is what keeps the workers busy.
+
+    Parameters
+    ----------
+    factory : SolverFactory
+    reference : ReferenceQuantities
+    folder : Path
+        Where results are kept.
+    workers : int
+        Number of processes.
+    watch : callable, optional
+        Told label and fraction done of the experiments that run.
+    """
+
+    def __init__(
+        self,
+        factory: SolverFactory,
+        reference: ReferenceQuantities,
+        folder: Path,
+        workers: int,
+        watch: Watch | None = None,
+    ) -> None:
+        self._factory = factory
+        self._factory_key = factory.key()
+        self._reference = reference
+        self._folder = folder
+        self._watch = watch
+        self._lock = threading.Lock()
+        self._futures: dict[str, Future[None]] = {}
+        # Each worker gets its share of the cores; numba and BLAS read this when the worker imports them.
+        share = str(max(1, (os.cpu_count() or 1) // workers))
+        os.environ.update(dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), share))
+        context = multiprocessing.get_context("spawn")
+        self._queue = context.Queue()
+        self._executor = ProcessPoolExecutor(workers, context, _start_worker, (factory, self._queue))
+        self._listener = threading.Thread(target=self._listen, daemon=True)
+        self._listener.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._executor.shutdown(wait=False, cancel_futures=True)
+        if kind is not None:
+            # Half-done experiments are not waited for: their checkpoints are on disk.
+            for process in multiprocessing.active_children():
+                process.terminate()
+        self._executor.shutdown(wait=True)
+        self._queue.put(None)
+        self._listener.join()
+
+    @property
+    def reference(self) -> ReferenceQuantities:
+        """What the loads are made dimensionless with."""
+        return self._reference
+
+    def steady(self, condition: FlightCondition, rates: Rates = Rates()) -> SteadyLoads:
+        """Loads of the steady state at constant velocity and body rates; see `indicial.solver.Solver`."""
+        content = json.loads(self._result(condition, SteadyMotion(condition, rates), None).read_text(encoding="utf-8"))
+        return SteadyLoads(np.array(content["coefficients"]), condition, rates, self._reference, content["convergence"])
+
+    def unsteady(self, condition: FlightCondition, motion: Motion, times: ArrayLike) -> History:
+        """Loads at `times` [s] under `motion`; see `indicial.solver.Solver`."""
+        return History.from_netcdf(self._result(condition, motion, np.asarray(times, dtype=float)))
+
+    def _result(self, condition: FlightCondition, motion: Motion, times: Array | None) -> Path:
+        """The result file, once it is there."""
+        experiment = describe_experiment(self._factory_key, condition, motion, times)
+        path = self._folder / experiment.file_name
+        with self._lock:
+            future = self._futures.get(experiment.key)
+            if future is None and not path.is_file():
+                log.info("experiment %s", experiment.label)
+                future = self._executor.submit(_perform, experiment, path)
+                self._futures[experiment.key] = future
+        if future is not None:
+            try:
+                future.result()
+            except BrokenProcessPool as error:
+                raise IndicialError(
+                    f"{experiment.label}: a worker process was ended from outside (out of memory?); "
+                    "run again to resume, with fewer workers or a coarser mesh"
+                ) from error
+        if self._watch is not None:
+            self._watch(experiment.label, 1.0)
+        return path
+
+    def _listen(self) -> None:
+        while (message := self._queue.get()) is not None:
+            if self._watch is not None:
+                self._watch(*message)
+
+
+class _Worker:
+    """What a worker process holds: its solvers, and the line to the parent."""
+
+    def __init__(self, factory: SolverFactory, queue: Any) -> None:
+        self._factory, self._queue = factory, queue
+        self._solvers: dict[bool, Solver] = {}
+        self._label = ""
+
+    def perform(self, experiment: Experiment, path: Path) -> None:
+        self._label = experiment.label
+        self._report(0.0)
+        try:
+            if experiment.times is None:
+                self._steady(experiment, path)
+            else:
+                solver = self._solver(experiment.whole)
+                solver.unsteady(experiment.condition, experiment.motion, experiment.times).to_netcdf(path)
+        except DivergenceError as error:
+            raise DivergenceError(f"{experiment.label}: {error}") from error
+
+    def _steady(self, experiment: Experiment, path: Path) -> None:
+        solver = self._solver(experiment.whole)
+        rates = Rates(*(float(rate) for rate in experiment.motion.rate(0.0)))
+        loads = solver.steady(experiment.condition, rates)
+        content: dict[str, Any] = {
+            "experiment": experiment.label,
+            "coefficients": loads.coefficients.tolist(),
+            "convergence": loads.convergence,
+        }
+        if isinstance(solver, TellsConvergence):
+            content["residuals"] = solver.convergence(experiment.condition, rates).tolist()
+        write_text(path, json.dumps(content, indent=1))
+
+    def _solver(self, whole: bool) -> Solver:
+        if whole not in self._solvers:
+            self._solvers[whole] = self._factory.build(whole, self._report)
+        return self._solvers[whole]
+
+    def _report(self, fraction: float) -> None:
+        self._queue.put((self._label, fraction))
+
+
+_worker: _Worker | None = None
+
+
+def _start_worker(factory: SolverFactory, queue: Any) -> None:
+    import signal
+
+    # Ctrl-C is the parent's to handle: it ends the workers.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    global _worker
+    _worker = _Worker(factory, queue)
+
+
+def _perform(experiment: Experiment, path: Path) -> None:
+    assert _worker is not None
+    _worker.perform(experiment, path)

@@ -1,0 +1,80 @@
+"""A missile-like linear system with known answers, as the solver of a pipeline run: seconds instead of minutes."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from indicial.conventions import Array, ReferenceQuantities
+from indicial.errors import DivergenceError
+from indicial.history import History
+from indicial.motion import FlightCondition, Motion, Rates
+from indicial.solver import Solver, SteadyLoads
+from theory.linear import LinearSystem
+
+
+def missile(reference: ReferenceQuantities) -> LinearSystem:
+    """Loads about the size of a finned missile's at M 2: settled values and two lags, symmetric in pitch and yaw."""
+    poles = np.array([-0.2, -0.5])
+    settled = np.zeros((6, 5))
+    settled[2, 0], settled[4, 0] = 11.0, -25.0  # CN, Cm with alpha
+    settled[2, 3], settled[4, 3] = 90.0, -330.0  # with q
+    settled[1, 1], settled[5, 1] = -11.0, 25.0  # CY, Cn with beta
+    settled[1, 4], settled[5, 4] = 90.0, -330.0  # with r
+    settled[3, 2] = -20.0  # Cl with p
+    lagging = np.array([0.3, 0.2])  # parts of the settled value that come late
+    b = np.repeat(-poles, 5)[:, None] * np.tile(np.eye(5), (2, 1))
+    c = np.concatenate([part * settled for part in lagging], axis=1)
+    d = (1.0 - lagging.sum()) * settled
+    offset = np.array([0.35, 0.0, 0.0, 0.0, 0.0, 0.0])
+    return LinearSystem(reference, np.repeat(poles, 5), b, c, d, offset)
+
+
+@dataclass(frozen=True)
+class Oracle:
+    """A `SolverFactory` of that system, which writes down every experiment that is really performed."""
+
+    reference: ReferenceQuantities
+    log: Path
+    fails_on: str = ""
+
+    def key(self) -> str:
+        return hashlib.sha256(repr(self.reference).encode()).hexdigest()
+
+    def build(self, whole: bool, progress: Callable[[float], None]) -> Solver:
+        return _Logged(missile(self.reference), self.log, self.fails_on, whole, progress)
+
+
+@dataclass(frozen=True)
+class _Logged:
+    solver: LinearSystem
+    log: Path
+    fails_on: str
+    whole: bool
+    progress: Callable[[float], None]
+
+    @property
+    def reference(self) -> ReferenceQuantities:
+        return self.solver.reference
+
+    def steady(self, condition: FlightCondition, rates: Rates = Rates()) -> SteadyLoads:
+        self._note("steady")
+        return self.solver.steady(condition, rates)
+
+    def unsteady(self, condition: FlightCondition, motion: Motion, times: Array) -> History:
+        self._note(str(motion.describe()["kind"]))
+        return self.solver.unsteady(condition, motion, times)
+
+    def convergence(self, condition: FlightCondition, rates: Rates = Rates()) -> Array:
+        return np.logspace(0, -9, 10)
+
+    def _note(self, what: str) -> None:
+        self.progress(0.5)
+        with self.log.open("a") as file:
+            file.write(f"{what} {'whole' if self.whole else 'half'}\n")
+        if what == self.fails_on:
+            raise DivergenceError("residual 1e+10 at step 3 of 9; try a smaller time step")
