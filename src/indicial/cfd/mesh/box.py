@@ -10,7 +10,7 @@ import numpy as np
 from indicial.cfd.mesh.geometry import Array
 from indicial.cfd.mesh.hexahedra import PatchSides
 from indicial.cfd.mesh.mesh import Mesh, PatchKind
-from indicial.cfd.mesh.structured import block_hexahedra, positive_count
+from indicial.cfd.mesh.structured import block_hexahedra, block_nodes, positive_count
 from indicial.errors import InputError
 
 Skew = Literal["none", "smooth", "random"]
@@ -70,8 +70,8 @@ def box_mesh(
     if skew != "none":
         unit += _displacement(unit, shape, skew, amplitude, seed)
     points = np.asarray(lower) + unit * (np.asarray(upper) - np.asarray(lower))
-    cells = block_hexahedra((shape[0] + 1, shape[1] + 1, shape[2] + 1))
-    number = np.arange(np.prod(shape)).reshape(shape)
+    cells = block_hexahedra(block_nodes(*(n + 1 for n in shape)))
+    number = block_nodes(*shape)
     layers = (number[0], number[-1], number[:, 0], number[:, -1], number[:, :, 0], number[:, :, -1])
     patches = [PatchSides.of(name, side_kinds[name], (layers[i], i)) for i, name in enumerate(SIDES)]
     return Mesh.from_hexahedra(points.reshape(-1, 3), cells.reshape(-1, 8), patches)

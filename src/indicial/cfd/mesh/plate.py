@@ -7,7 +7,15 @@ import numpy as np
 from indicial.cfd.mesh.geometry import Array
 from indicial.cfd.mesh.hexahedra import I_MINUS, I_PLUS, J_MINUS, J_PLUS, K_MINUS, K_PLUS, PatchSides
 from indicial.cfd.mesh.mesh import Mesh
-from indicial.cfd.mesh.structured import block_hexahedra, extrude, geometric, positive, positive_count, two_sided
+from indicial.cfd.mesh.structured import (
+    block_hexahedra,
+    block_nodes,
+    extrude,
+    geometric,
+    positive,
+    positive_count,
+    two_sided,
+)
 
 
 def plate_mesh(
@@ -61,9 +69,10 @@ def plate_mesh(
     x = np.concatenate([-upstream[:0:-1], two_sided(edge, edge, n_chord), 1.0 + downstream[1:]])
     half = geometric(wall, height, n_normal)
     z = np.concatenate([-half[:0:-1], half])
-    points = chord * extrude(*np.meshgrid(x, z, indexing="ij"), thickness)
-    cells = block_hexahedra((x.size, 2, z.size))
-    number = np.arange(cells[..., 0].size).reshape(cells.shape[:3])
+    plane_x, plane_z = np.meshgrid(x, z, indexing="ij")
+    points = chord * extrude(plane_x, plane_z, thickness)
+    cells = block_hexahedra(block_nodes(x.size, 2, z.size))
+    number = block_nodes(*cells.shape[:3])
     plate = slice(upstream.size - 1, upstream.size - 1 + n_chord)
     patches = [
         PatchSides.of("upper", "wall", (number[plate, :, n_normal], K_MINUS)),

@@ -9,13 +9,17 @@ from indicial.cfd.mesh.geometry import Array, Index
 from indicial.errors import InputError
 
 
-def block_hexahedra(shape: tuple[int, int, int]) -> Index:
-    """Node numbers of a block's cells, (ni-1, nj-1, nk-1, 8), nodes numbered in C order of `shape` = (ni, nj, nk).
+def block_nodes(*shape: int) -> Index:
+    """Node numbers of a block of ``ni nj nk`` nodes, in C order."""
+    return np.arange(np.prod(shape), dtype=np.int64).reshape(shape)
+
+
+def block_hexahedra(nodes: Index) -> Index:
+    """Hexahedra (ni-1, nj-1, nk-1, 8) of a block whose nodes have the numbers (ni, nj, nk).
 
     ``cells.reshape(-1, 8)`` numbers cells with i slowest and k fastest.
     """
-    n = np.arange(np.prod(shape), dtype=np.int64).reshape(shape)
-    lower, upper = n[:, :, :-1], n[:, :, 1:]
+    lower, upper = nodes[:, :, :-1], nodes[:, :, 1:]
 
     def corners(layer: Index) -> list[Index]:
         return [layer[:-1, :-1], layer[1:, :-1], layer[1:, 1:], layer[:-1, 1:]]

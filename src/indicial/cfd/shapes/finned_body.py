@@ -113,8 +113,5 @@ class FinnedBody:
                 f"{f.number} fins ({f.section}, chords {f.root_chord:g} and {f.tip_chord:g}, span {f.span:g}, "
                 f"trailing edge at {f.trailing_edge:g})"
             )
-        angle = np.rad2deg(self.nose.tip_half_angle)
-        return (
-            f"{self.nose.type} nose of {self.nose.length:.4g} (tip {angle:.4g} deg), length {self.length:g} calibres of "
-            f"{self.diameter:g} m, {fins}"
-        )
+        nose = f"{self.nose.type} nose of {self.nose.length:.4g} (tip {np.rad2deg(self.nose.tip_half_angle):.4g} deg)"
+        return f"{nose}, length {self.length:g} calibres of {self.diameter:g} m, {fins}"

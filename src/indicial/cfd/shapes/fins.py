@@ -90,7 +90,7 @@ class FinSet:
     @property
     def angles(self) -> Array:
         """Angles of the fins from the y axis towards the z axis [rad], in [0, 2 pi), shape (number,)."""
-        return np.deg2rad((self.roll_deg + 360.0 / self.number * np.arange(self.number)) % 360.0)
+        return np.asarray(np.deg2rad((self.roll_deg + 360.0 / self.number * np.arange(self.number)) % 360.0))
 
     @property
     def planform_area(self) -> float:

@@ -56,10 +56,10 @@ class Nose:
         """Radius [calibres] at x [calibres] from the tip; 0 ahead of it and 1/2 behind the nose."""
         s = np.clip(np.asarray(x, dtype=float), 0.0, self.length)
         if self.type == "cone":
-            return 0.5 * s / self.length
+            return np.asarray(0.5 * s / self.length)
         # r = sqrt(a^2 - (L - x)^2) + 1/2 - a, written without the difference of large numbers
         gap = (self.length - s) ** 2
-        return 0.5 - gap / (self._arc + np.sqrt(self._arc**2 - gap))
+        return np.asarray(0.5 - gap / (self._arc + np.sqrt(self._arc**2 - gap)))
 
     @property
     def volume(self) -> float:
