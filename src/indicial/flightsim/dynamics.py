@@ -1,0 +1,274 @@
+r"""One symbolic model of the motion of a rigid vehicle, for simulation, linearisation and identification.
+
+State: position of the centre of gravity (earth axes), its velocity (body axes), attitude quaternion body -> earth
+(scalar first), body rates, aerodynamic lag states.
+
+    m (vdot + omega x v) = F + m R^T g            I omegadot + omega x I omega = M + r x F
+    xdot = R v            qdot = 1/2 q o (0, omega)
+
+with F, M the aerodynamic loads about the moment reference point and r its arm from the centre of gravity.
+
+The rotation matrix is built from ``q/|q|``, so the motion does not depend on the quaternion's norm; and since qdot is
+linear in q, neither does any Runge-Kutta step. The norm may drift in the last digits and does no harm: no
+renormalisation, no stabilising term.
+
+Loads that depend on the rate of incidence do so on ``T = V d(v/V, w/V)/dt``, which is itself linear in the
+accelerations, which are linear in T: ``T = T0 + J T`` is solved exactly, so alphadot derivatives are part of the
+mass matrix and nothing is lagged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from indicial.conventions import Array
+from indicial.errors import InputError
+from indicial.flightsim.aerodynamics import Aerodynamics, FlowState
+from indicial.flightsim.atmosphere import Air, Atmosphere, ConstantAtmosphere
+from indicial.flightsim.earth import Earth, FlatEarth
+from indicial.flightsim.initial import InitialState
+from indicial.flightsim.vehicle import Vehicle
+
+POSITION, VELOCITY, QUATERNION, RATE = slice(0, 3), slice(3, 6), slice(6, 10), slice(10, 13)
+RIGID_STATES = ("x", "y", "z", "u", "v", "w", "q0", "q1", "q2", "q3", "p", "q", "r")
+
+_REST = 1e-9  # m/s; makes directions smooth at rest, below round-off of V from 0.1 m/s up
+
+
+@dataclass(frozen=True)
+class Dynamics:
+    """The equations of motion of one vehicle with one aerodynamic model.
+
+    Parameters
+    ----------
+    vehicle, aerodynamics, atmosphere, earth
+        What the model is made of.
+    derivative : casadi.Function
+        (state, parameters) -> time derivative of the state.
+    loads : casadi.Function
+        (state, parameters) -> (force [N], moment about the centre of gravity [N m], density [kg/m^3], speed of sound
+        [m/s]), body axes.
+    altitude : casadi.Function
+        state -> geometric altitude [m].
+    state_names, parameter_names : tuple of str
+        Parameters are the free symbols of the aerodynamic model, in its order.
+    """
+
+    vehicle: Vehicle
+    aerodynamics: Aerodynamics
+    atmosphere: Atmosphere
+    earth: Earth
+    derivative: Any
+    loads: Any
+    altitude: Any
+    state_names: tuple[str, ...]
+    parameter_names: tuple[str, ...]
+
+    @property
+    def lag_states(self) -> int:
+        """Number of aerodynamic lag states."""
+        return len(self.state_names) - len(RIGID_STATES)
+
+    def parameter_vector(self, parameters: Mapping[str, float] | None = None) -> Array:
+        """Values of the parameters in their order, shape (n,).
+
+        Raises
+        ------
+        InputError
+            If one is missing or unknown.
+        """
+        values = dict(parameters or {})
+        if set(values) != set(self.parameter_names):
+            raise InputError(
+                f"parameters given are ({', '.join(values)}), the model's are ({', '.join(self.parameter_names)})"
+            )
+        return np.array([values[name] for name in self.parameter_names])
+
+    def initial_vector(self, initial: InitialState, parameters: ArrayLike = ()) -> Array:
+        """State vector of an initial state, its lag states settled if they are not given.
+
+        Settled means ``lag_rate = 0`` at the initial incidence and rates; at rest, where reduced time stands still,
+        lag states start at 0.
+
+        Raises
+        ------
+        InputError
+            If the number of lag states is not the model's.
+        """
+        lag: Array = np.zeros(self.lag_states) if initial.lag is None else initial.lag
+        if lag.shape != (self.lag_states,):
+            raise InputError(f"initial state has {lag.size} lag states, the aerodynamic model {self.lag_states}")
+        state = np.concatenate([initial.position, initial.velocity, initial.quaternion, initial.rate, lag])
+        if initial.lag is None and self.lag_states and np.any(initial.velocity):
+            jacobian = np.array(self.derivative.jacobian()(state, parameters, 0)[0])[13:, 13:]
+            forcing = np.array(self.derivative(state, parameters)).ravel()[13:]
+            state[13:] = -np.linalg.solve(jacobian, forcing)
+        return state
+
+    def step(self) -> Any:
+        """Classical fourth-order Runge-Kutta step: casadi.Function (state, parameters, step [s]) -> state."""
+        state, parameters = (
+            ca.SX.sym("state", len(self.state_names)),
+            ca.SX.sym("parameters", len(self.parameter_names)),
+        )
+        length = ca.SX.sym("step")
+        after = _runge_kutta(lambda y: self.derivative(y, parameters), state, length)
+        return ca.Function("step", [state, parameters, length], [after], ["state", "parameters", "step"], ["after"])
+
+    def step_in_distance(self) -> Any:
+        """The step with downrange distance x as independent variable, time appended to the state.
+
+        casadi.Function ((state, time), parameters, step [m]) -> (state, time): stations of a range are grid points, so
+        nothing has to be interpolated. Needs flight in the direction of x.
+        """
+        state, time = ca.SX.sym("state", len(self.state_names)), ca.SX.sym("time")
+        parameters, length = ca.SX.sym("parameters", len(self.parameter_names)), ca.SX.sym("step")
+
+        def per_distance(y: Any) -> Any:
+            rate = self.derivative(y[:-1], parameters)
+            return ca.vertcat(rate, 1.0) / rate[0]
+
+        after = _runge_kutta(per_distance, ca.vertcat(state, time), length)
+        names = ["state", "parameters", "step"]
+        return ca.Function("step", [ca.vertcat(state, time), parameters, length], [after], names, ["after"])
+
+    def march(self, steps: int) -> Any:
+        """`step` taken `steps` times: (state, parameters, step lengths (1, n)) -> states after each (nx, n)."""
+        return repeat(self.step(), steps)
+
+    def march_in_distance(self, steps: int) -> Any:
+        """`step_in_distance` taken `steps` times; the last row of the result is time [s]."""
+        return repeat(self.step_in_distance(), steps)
+
+
+def repeat(step: Any, steps: int) -> Any:
+    """A step function taken `steps` times in one casadi.Function with one parameter vector."""
+    state, parameters = ca.MX.sym("state", step.size1_in(0)), ca.MX.sym("parameters", step.size1_in(1))
+    lengths = ca.MX.sym("steps", 1, steps)
+    states = step.mapaccum("march", steps)(state, ca.repmat(parameters, 1, steps), lengths)
+    names = ["state", "parameters", "steps"]
+    return ca.Function("march", [state, parameters, lengths], [states], names, ["states"])
+
+
+def _runge_kutta(derivative: Any, state: Any, step: Any) -> Any:
+    k1 = derivative(state)
+    k2 = derivative(state + step / 2.0 * k1)
+    k3 = derivative(state + step / 2.0 * k2)
+    k4 = derivative(state + step * k3)
+    return state + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+
+
+def build_dynamics(
+    vehicle: Vehicle,
+    aerodynamics: Aerodynamics,
+    atmosphere: Atmosphere | None = None,
+    earth: Earth | None = None,
+) -> Dynamics:
+    """The equations of motion as casadi functions of state and parameters.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    aerodynamics : Aerodynamics
+        Its loads, about its own moment reference point, are transferred to the centre of gravity exactly.
+    atmosphere : Atmosphere, optional
+        Still air; `ConstantAtmosphere` at 20 C and 1 atm if not given.
+    earth : Earth, optional
+        `FlatEarth` if not given.
+
+    Raises
+    ------
+    InputError
+        If the vehicle and the aerodynamic model differ in reference length or area.
+    """
+    _check_reference(vehicle, aerodynamics)
+    atmosphere = ConstantAtmosphere() if atmosphere is None else atmosphere
+    earth = FlatEarth() if earth is None else earth
+    state = ca.SX.sym("state", len(RIGID_STATES) + len(aerodynamics.lag_names))
+    position, velocity, quaternion, rate = state[POSITION], state[VELOCITY], state[QUATERNION], state[RATE]
+    lag = state[len(RIGID_STATES) :]
+    parameters = ca.vertcat(ca.SX(0, 1), *aerodynamics.parameters)
+
+    rotation = _rotation(quaternion)
+    altitude = earth.altitude(position)
+    air = atmosphere.air(altitude)
+    arm = ca.DM(vehicle.arm_to(aerodynamics.reference.moment_reference))
+    turning = ca.SX.sym("turning", 2)
+    flow = _flow(air, velocity + ca.cross(rate, arm), rate, turning)
+    force, moment = aerodynamics.loads(flow, lag)
+    moment = moment + ca.cross(arm, force)
+
+    inertia = ca.sparsify(ca.DM(vehicle.inertia))
+    inverse = ca.sparsify(ca.DM(np.linalg.inv(vehicle.inertia)))
+    gravity = ca.mtimes(rotation.T, earth.gravity(position))
+    acceleration = force / vehicle.mass + gravity - ca.cross(rate, velocity)
+    turn_rate = ca.mtimes(inverse, moment - ca.cross(rate, ca.mtimes(inertia, rate)))
+
+    solution = _solve_turning(turning, flow, velocity, rate, arm, acceleration + ca.cross(turn_rate, arm))
+    derivative = ca.vertcat(
+        ca.mtimes(rotation, velocity),
+        acceleration,
+        _quaternion_rate(quaternion, rate),
+        turn_rate,
+        aerodynamics.lag_rate(flow, lag),
+    )
+    derivative, force, moment = ca.substitute([derivative, force, moment], [turning], [solution])
+    inputs, names = [state, parameters], ["state", "parameters"]
+    outputs = [force, moment, flow.density, flow.speed_of_sound]
+    return Dynamics(
+        vehicle=vehicle,
+        aerodynamics=aerodynamics,
+        atmosphere=atmosphere,
+        earth=earth,
+        derivative=ca.Function("derivative", inputs, [ca.densify(derivative)], names, ["derivative"]),
+        loads=ca.Function("loads", inputs, [ca.densify(o) for o in outputs], names, ["force", "moment", "rho", "a"]),
+        altitude=ca.Function("altitude", [state], [altitude], ["state"], ["altitude"]),
+        state_names=(*RIGID_STATES, *aerodynamics.lag_names),
+        parameter_names=tuple(symbol.name() for symbol in aerodynamics.parameters),
+    )
+
+
+def _check_reference(vehicle: Vehicle, aerodynamics: Aerodynamics) -> None:
+    for name in ("length", "area"):
+        own, model = getattr(vehicle.reference, name), getattr(aerodynamics.reference, name)
+        if abs(model - own) > 1e-6 * own:
+            raise InputError(f"reference {name} of the aerodynamic model is {model:g}, of {vehicle.name} {own:g}")
+
+
+def _flow(air: Air, velocity: Any, rate: Any, turning: Any) -> FlowState:
+    speed = ca.sqrt(ca.sumsqr(velocity) + _REST**2)
+    return FlowState(air.density, air.speed_of_sound, speed, velocity[1:] / speed, rate, turning)
+
+
+def _solve_turning(turning: Any, flow: FlowState, velocity: Any, rate: Any, arm: Any, acceleration: Any) -> Any:
+    """The T with ``T = T(accelerations(T))``, for accelerations of the moment reference point linear in T."""
+    direction = (velocity + ca.cross(rate, arm)) / flow.speed
+    implied = (acceleration - direction * ca.dot(direction, acceleration))[1:]
+    slope = ca.jacobian(implied, turning)
+    constant = ca.substitute(implied, turning, ca.DM.zeros(2, 1))
+    if slope.nnz() == 0:
+        return constant
+    return ca.mtimes(ca.inv_minor(ca.densify(ca.DM.eye(2) - slope)), constant)
+
+
+def _rotation(quaternion: Any) -> Any:
+    """Rotation matrix body -> earth of a quaternion of any norm."""
+    w, x, y, z = ca.vertsplit(quaternion)
+    scale = 2.0 / ca.sumsqr(quaternion)
+    return ca.vertcat(
+        ca.horzcat(1 - scale * (y * y + z * z), scale * (x * y - w * z), scale * (x * z + w * y)),
+        ca.horzcat(scale * (x * y + w * z), 1 - scale * (x * x + z * z), scale * (y * z - w * x)),
+        ca.horzcat(scale * (x * z - w * y), scale * (y * z + w * x), 1 - scale * (x * x + y * y)),
+    )
+
+
+def _quaternion_rate(quaternion: Any, rate: Any) -> Any:
+    w, x, y, z = ca.vertsplit(quaternion)
+    p, q, r = ca.vertsplit(rate)
+    return 0.5 * ca.vertcat(-x * p - y * q - z * r, w * p + y * r - z * q, w * q - x * r + z * p, w * r + x * q - y * p)

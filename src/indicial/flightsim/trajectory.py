@@ -1,0 +1,388 @@
+"""A flight: labelled states and loads in time, with units, files and interpolation."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from indicial.conventions import COEFFICIENTS, Array, ReferenceQuantities, flow_angles
+from indicial.errors import InputError
+from indicial.files import atomic_path, write_text
+from indicial.flightsim.attitude import euler_angles, matrix_from_quaternion
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
+
+SCHEMA_VERSION = 1
+FORMAT = "indicial trajectory"
+
+_COLUMNS = {
+    "position": ("x_m", "y_m", "z_m"),
+    "velocity": ("u_m_s", "v_m_s", "w_m_s"),
+    "quaternion": ("q0", "q1", "q2", "q3"),
+    "rate": ("p_rad_s", "q_rad_s", "r_rad_s"),
+    "force": ("force_x_n", "force_y_n", "force_z_n"),
+    "moment": ("moment_x_n_m", "moment_y_n_m", "moment_z_n_m"),
+}
+_UNITS = {"position": "m", "velocity": "m/s", "quaternion": "1", "rate": "rad/s", "force": "N", "moment": "N m"}
+_AXES = {"position": "earth", "quaternion": "body to earth"}
+_ANGLES_DEG = {"alpha_deg": "alpha", "beta_deg": "beta", "total_angle_deg": "total_angle"}
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """States and aerodynamic loads of a flight at instants.
+
+    Parameters
+    ----------
+    time : ndarray
+        Strictly increasing [s], shape (n,).
+    position : ndarray
+        Centre of gravity, earth axes x downrange, y right, z down [m], shape (n, 3).
+    velocity : ndarray
+        Of the centre of gravity, body axes [m/s], shape (n, 3).
+    quaternion : ndarray
+        Unit, scalar first, body -> earth, shape (n, 4).
+    rate : ndarray
+        (p, q, r), body axes [rad/s], shape (n, 3).
+    force, moment : ndarray
+        Aerodynamic force [N] and moment about the centre of gravity [N m], body axes, shape (n, 3).
+    density, speed_of_sound : ndarray
+        Of the air [kg/m^3], [m/s], shape (n,).
+    lag : ndarray
+        Aerodynamic lag states, shape (n, n_lag).
+    outside_range : ndarray of bool
+        Where the aerodynamic model or the atmosphere was used beyond where it holds, shape (n,).
+    reference : ReferenceQuantities
+    lag_names : tuple of str
+    provenance : dict
+        How it was made: vehicle, method, step, error estimate (plain values).
+    """
+
+    time: Array
+    position: Array
+    velocity: Array
+    quaternion: Array
+    rate: Array
+    force: Array
+    moment: Array
+    density: Array
+    speed_of_sound: Array
+    lag: Array
+    outside_range: NDArray[np.bool_]
+    reference: ReferenceQuantities
+    lag_names: tuple[str, ...] = ()
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        n = np.size(self.time)
+        shapes = {"time": (n,), "density": (n,), "speed_of_sound": (n,), "lag": (n, len(self.lag_names))}
+        shapes |= {name: (n, len(columns)) for name, columns in _COLUMNS.items()}
+        for name, shape in shapes.items():
+            values = np.asarray(getattr(self, name), dtype=float)
+            if values.shape != shape or not np.all(np.isfinite(values)):
+                raise InputError(f"trajectory {name} must be finite and of shape {shape}, not {values.shape}")
+            object.__setattr__(self, name, values)
+        object.__setattr__(self, "outside_range", np.asarray(self.outside_range, dtype=bool).reshape(n))
+        if n < 1 or np.any(np.diff(self.time) <= 0.0):
+            raise InputError("trajectory time must be strictly increasing")
+
+    def __len__(self) -> int:
+        return int(self.time.size)
+
+    @property
+    def speed(self) -> Array:
+        """V of the centre of gravity [m/s]."""
+        return flow_angles(self.velocity)[0]
+
+    @property
+    def alpha(self) -> Array:
+        """``atan2(w, u)`` [rad]."""
+        return flow_angles(self.velocity)[1]
+
+    @property
+    def beta(self) -> Array:
+        """``asin(v/V)`` [rad]."""
+        return flow_angles(self.velocity)[2]
+
+    @property
+    def total_angle(self) -> Array:
+        """Angle between the body's x axis and the velocity [rad]."""
+        u, v, w = self.velocity.T
+        angle: Array = np.arctan2(np.hypot(v, w), u)
+        return angle
+
+    @property
+    def mach(self) -> Array:
+        """Mach number."""
+        return self.speed / self.speed_of_sound
+
+    @property
+    def euler(self) -> Array:
+        """(yaw, pitch, roll) [rad], shape (n, 3)."""
+        return euler_angles(self.quaternion)
+
+    @property
+    def earth_velocity(self) -> Array:
+        """Velocity, earth axes [m/s], shape (n, 3)."""
+        turned: Array = np.einsum("nij,nj->ni", matrix_from_quaternion(self.quaternion), self.velocity)
+        return turned
+
+    @property
+    def coefficients(self) -> Array:
+        """(CA, CY, CN, Cl, Cm, Cn), moments about the centre of gravity, shape (n, 6); 0 at rest."""
+        pressure_area = 0.5 * self.density * self.speed**2 * self.reference.area
+        scale = np.divide(1.0, pressure_area, out=np.zeros_like(pressure_area), where=pressure_area > 0.0)[:, None]
+        force = self.force * np.array([-1.0, 1.0, -1.0]) * scale
+        return np.hstack([force, self.moment * scale / self.reference.moment_lengths])
+
+    @property
+    def distance(self) -> Array:
+        """Length of path flown from the first instant [m]."""
+        from scipy.interpolate import CubicSpline
+
+        if len(self) < 2:
+            return np.zeros(len(self))
+        length: Array = CubicSpline(self.time, self.speed).antiderivative()(self.time)
+        return length
+
+    @property
+    def non_rolling_incidence(self) -> Any:
+        r"""``xi = (v + i w)/V exp(i integral of p dt)``, beta + i alpha in axes that do not roll, complex (n,)."""
+        from scipy.interpolate import CubicSpline
+
+        turned = CubicSpline(self.time, self.rate[:, 0]).antiderivative()(self.time) if len(self) > 1 else 0.0
+        incidence = self.velocity[:, 1] + 1j * self.velocity[:, 2]
+        speed = self.speed
+        return np.divide(incidence, speed, out=np.zeros_like(incidence), where=speed > 0.0) * np.exp(1j * turned)
+
+    def at_times(self, times: ArrayLike) -> Trajectory:
+        """The flight at other instants [s], by cubic splines (fourth order in the sampling interval).
+
+        Raises
+        ------
+        InputError
+            If an instant lies outside the flight.
+        """
+        from scipy.interpolate import CubicSpline
+
+        t = np.atleast_1d(np.asarray(times, dtype=float))
+        if t.size == 0 or np.min(t) < self.time[0] or np.max(t) > self.time[-1]:
+            raise InputError(f"times must be within {self.time[0]:g} to {self.time[-1]:g} s of the trajectory")
+        names = (*_COLUMNS, "density", "speed_of_sound", "lag")
+        values: dict[str, Any] = {name: CubicSpline(self.time, getattr(self, name))(t) for name in names}
+        values["quaternion"] /= np.linalg.norm(values["quaternion"], axis=1, keepdims=True)
+        nearest = np.clip(np.searchsorted(self.time, t), 0, len(self) - 1)
+        return Trajectory(
+            time=t,
+            **values,
+            outside_range=self.outside_range[nearest],
+            reference=self.reference,
+            lag_names=self.lag_names,
+            provenance=self.provenance,
+        )
+
+    def at_stations(self, x: ArrayLike) -> Trajectory:
+        """The flight where it passes downrange stations x [m].
+
+        Raises
+        ------
+        InputError
+            If the flight does not pass a station, or does not go steadily downrange.
+        """
+        from scipy.interpolate import CubicSpline
+
+        stations = np.atleast_1d(np.asarray(x, dtype=float))
+        along = self.position[:, 0]
+        if np.any(np.diff(along) <= 0.0):
+            raise InputError("stations need a flight that goes downrange all the time (x increasing)")
+        if stations.size == 0 or np.min(stations) < along[0] or np.max(stations) > along[-1]:
+            raise InputError(f"stations must be within x = {along[0]:g} to {along[-1]:g} m of the trajectory")
+        distance = CubicSpline(self.time, along)
+        times = np.interp(stations, along, self.time)
+        for _ in range(4):
+            times = np.clip(times - (distance(times) - stations) / distance(times, 1), self.time[0], self.time[-1])
+        return self.at_times(times)
+
+    def to_dataset(self) -> xarray.Dataset:
+        """The trajectory as an `xarray.Dataset` with units."""
+        import xarray as xr
+
+        data: dict[str, Any] = {}
+        for name in _COLUMNS:
+            second = "component" if name == "quaternion" else "axis"
+            attrs = {"units": _UNITS[name], "axes": _AXES.get(name, "body")}
+            data[name] = (("time", second), getattr(self, name), attrs)
+        data["lag"] = (("time", "lag_state"), self.lag, {"units": "1"})
+        data["density"] = ("time", self.density, {"units": "kg/m^3"})
+        data["speed_of_sound"] = ("time", self.speed_of_sound, {"units": "m/s"})
+        data["mach"] = ("time", self.mach, {"units": "1"})
+        for name in ("alpha", "beta", "total_angle"):
+            data[name] = ("time", getattr(self, name), {"units": "rad"})
+        data["coefficients"] = (
+            ("time", "coefficient"),
+            self.coefficients,
+            {"units": "1", "axes": "body", "moments": "about the centre of gravity"},
+        )
+        data["outside_range"] = ("time", self.outside_range.astype(np.int8), {"units": "1"})
+        coords: dict[str, Any] = {
+            "time": ("time", self.time, {"units": "s"}),
+            "axis": ["x", "y", "z"],
+            "component": ["q0", "q1", "q2", "q3"],
+            "coefficient": list(COEFFICIENTS),
+        }
+        return xr.Dataset(data, coords, self._header())
+
+    def to_netcdf(self, path: str | Path) -> None:
+        """Write a netCDF-4 file in one step."""
+        with atomic_path(path) as temporary:
+            self.to_dataset().to_netcdf(temporary, engine="h5netcdf")
+
+    @classmethod
+    def from_netcdf(cls, path: str | Path) -> Self:
+        """Read a file of `to_netcdf`.
+
+        Raises
+        ------
+        InputError
+            If the file is missing or not an indicial trajectory.
+        """
+        import xarray as xr
+
+        if not Path(path).is_file():
+            raise InputError(f"{path}: no such trajectory file")
+        try:
+            with xr.open_dataset(path, engine="h5netcdf") as opened:
+                data = opened.load()
+        except (OSError, ValueError) as error:
+            raise InputError(f"{path}: not a netCDF file ({error})") from error
+        header = _checked_header(dict(data.attrs), path)
+        names = ("time", *_COLUMNS, "density", "speed_of_sound", "lag", "outside_range")
+        values: dict[str, Any] = {name: data[name].values for name in names}
+        return cls(**values, **header)
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write a CSV file: header in `#` lines, units in column names, every digit kept.
+
+        Angles in degrees and the Mach number are written too, for the reader; `from_csv` does not need them.
+        """
+        out = io.StringIO()
+        for key, value in self._header().items():
+            out.write(f"# {key}: {value}\n")
+        columns = {"time_s": self.time}
+        for name, labels in _COLUMNS.items():
+            columns |= dict(zip(labels, getattr(self, name).T, strict=True))
+        columns |= {"density_kg_m3": self.density, "speed_of_sound_m_s": self.speed_of_sound}
+        columns |= dict(zip(self.lag_names, self.lag.T, strict=True))
+        columns |= {"mach": self.mach}
+        columns |= {label: np.degrees(getattr(self, name)) for label, name in _ANGLES_DEG.items()}
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerow([*columns, "outside_range"])
+        for row, outside in zip(np.column_stack(list(columns.values())).tolist(), self.outside_range, strict=True):
+            writer.writerow([*map(repr, row), int(outside)])
+        write_text(path, out.getvalue())
+
+    @classmethod
+    def from_csv(cls, path: str | Path) -> Self:
+        """Read a file of `to_csv`, columns by name.
+
+        Raises
+        ------
+        InputError
+            If the file is missing, not an indicial trajectory, or lacks a column.
+        """
+        try:
+            lines = Path(path).read_text(encoding="utf-8").splitlines()
+        except OSError as error:
+            raise InputError(f"{path}: not a readable trajectory file ({error.strerror})") from error
+        attrs = dict(line[2:].split(": ", 1) for line in lines if line.startswith("# ") and ": " in line)
+        header = _checked_header(attrs, path)
+        rows = list(csv.reader(line for line in lines if not line.startswith("#")))
+        try:
+            table = np.array(rows[1:], dtype=float)
+            column = {name: table[:, i] for i, name in enumerate(rows[0])}
+            values: dict[str, Any] = {name: np.stack([column[c] for c in labels], axis=1) for name, labels in _COLUMNS.items()}
+            lag = np.reshape([column[c] for c in header["lag_names"]], (len(header["lag_names"]), len(table))).T
+            return cls(
+                time=column["time_s"],
+                **values,
+                density=column["density_kg_m3"],
+                speed_of_sound=column["speed_of_sound_m_s"],
+                lag=lag,
+                outside_range=column["outside_range"],
+                **header,
+            )
+        except (IndexError, KeyError, ValueError) as error:
+            raise InputError(f"{path}: not a complete trajectory ({error})") from error
+
+    def _header(self) -> dict[str, Any]:
+        return {
+            "format": FORMAT,
+            "schema_version": SCHEMA_VERSION,
+            "reference": json.dumps(self.reference.to_dict()),
+            "lag_names": json.dumps(list(self.lag_names)),
+            "provenance": json.dumps(self.provenance),
+        }
+
+    def summary(self) -> str:
+        """What was flown, how far, how fast, within the models' range or not."""
+        first, last = self.position[0], self.position[-1]
+        who = self.provenance.get("vehicle", "trajectory")
+        lines = [
+            f"{who}: {len(self)} instants over {self.time[-1] - self.time[0]:.6g} s, "
+            f"x {first[0]:.6g} to {last[0]:.6g} m, y {last[1]:.4g} m, altitude {-last[2]:.6g} m at the end",
+            f"  Mach {self.mach[0]:.4g} to {self.mach[-1]:.4g}, total angle of attack up to "
+            f"{math.degrees(np.max(self.total_angle)):.4g} deg, roll rate {self.rate[-1, 0]:.4g} rad/s at the end",
+        ]
+        if "position_error_m" in self.provenance:
+            lines.append(
+                f"  {self.provenance['method']}, step {self.provenance['step_s']:.3g} s; error by halving it: "
+                f"position {self.provenance['position_error_m']:.2g} m, attitude {self.provenance['attitude_error_rad']:.2g} rad"
+            )
+        outside = int(np.count_nonzero(self.outside_range))
+        if outside:
+            when = self.time[np.argmax(self.outside_range)]
+            lines.append(f"  OUTSIDE the models' stated range at {outside} instants, first at t = {when:.6g} s")
+        return "\n".join(lines)
+
+    def plot(self) -> Figure:
+        """Angles against distance, alpha-beta motion in non-rolling axes, Mach number and swerve."""
+        import matplotlib.pyplot as plt
+
+        figure, axes = plt.subplots(2, 2, figsize=(10, 7), layout="constrained")
+        x = self.position[:, 0]
+        motion = math.degrees(1.0) * self.non_rolling_incidence
+        axes[0, 0].plot(x, np.degrees(self.alpha), label="alpha")
+        axes[0, 0].plot(x, np.degrees(self.beta), label="beta")
+        axes[0, 0].plot(x, np.degrees(self.total_angle), color="0.6", label="total")
+        axes[0, 0].set(xlabel="x [m]", ylabel="angle [deg]")
+        axes[0, 0].legend()
+        axes[0, 1].plot(motion.real, motion.imag)
+        axes[0, 1].set(xlabel="beta, not rolling [deg]", ylabel="alpha, not rolling [deg]", aspect="equal")
+        axes[0, 1].set_adjustable("datalim")
+        axes[1, 0].plot(x, self.mach)
+        axes[1, 0].set(xlabel="x [m]", ylabel="Mach number")
+        axes[1, 1].plot(x, self.position[:, 1], label="y (right)")
+        axes[1, 1].plot(x, self.position[:, 2], label="z (down)")
+        axes[1, 1].set(xlabel="x [m]", ylabel="[m]")
+        axes[1, 1].legend()
+        return figure
+
+
+def _checked_header(attrs: dict[str, Any], path: str | Path) -> dict[str, Any]:
+    if attrs.get("format") != FORMAT or int(attrs.get("schema_version", 0)) != SCHEMA_VERSION:
+        raise InputError(f"{path}: not an {FORMAT} of schema version {SCHEMA_VERSION}")
+    return {
+        "reference": ReferenceQuantities.from_dict(json.loads(attrs["reference"])),
+        "lag_names": tuple(json.loads(attrs["lag_names"])),
+        "provenance": json.loads(attrs["provenance"]),
+    }
