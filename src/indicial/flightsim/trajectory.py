@@ -310,7 +310,9 @@ class Trajectory:
         try:
             table = np.array(rows[1:], dtype=float)
             column = {name: table[:, i] for i, name in enumerate(rows[0])}
-            values: dict[str, Any] = {name: np.stack([column[c] for c in labels], axis=1) for name, labels in _COLUMNS.items()}
+            values: dict[str, Any] = {
+                name: np.stack([column[c] for c in labels], axis=1) for name, labels in _COLUMNS.items()
+            }
             lag = np.reshape([column[c] for c in header["lag_names"]], (len(header["lag_names"]), len(table))).T
             return cls(
                 time=column["time_s"],
