@@ -84,7 +84,8 @@ def finned_body_mesh(
     sectors = split_into_sectors(body.fins, sector)
     frame = _frame(body, factor, mach, margin)
     columns = [_columns(s, factor) for s in sectors]
-    points = np.concatenate([_sector_nodes(frame, s, f) for s, f in zip(sectors, columns, strict=True)], axis=2)
+    blocks = [_sector_nodes(frame, s, f, body.fins) for s, f in zip(sectors, columns, strict=True)]
+    points = np.concatenate(blocks, axis=2)
     _close_planes(points, body, sector)
     return _assemble(frame, points, sectors, [f.size for f in columns], sector).scaled(body.diameter)
 
@@ -155,28 +156,24 @@ def _frame(body: FinnedBody, factor: float, mach: float, margin: float) -> _Fram
 def _planes(body: FinnedBody, factor: float) -> tuple[Array, int, int]:
     """Axial stations [calibres], and the indices of the fins' leading and trailing edges."""
     nose, fins = body.nose, body.fins
-    tip_step = 0.025 * nose.length
-    anchors = [Anchor(-2.0 * tip_step, tip_step), Anchor(0.0, tip_step)]
-    largest = 0.6
+    tip_step, largest = 0.025 * nose.length, 0.6
+    anchors = [Anchor(-2.0 * tip_step, tip_step, tip_step), Anchor(0.0, tip_step, min(largest, 0.1 * nose.length))]
     if nose.length < body.length * (1.0 - 1e-9):
-        anchors.append(Anchor(nose.length, min(0.16, nose.length / 10.0)))
+        anchors.append(Anchor(nose.length, min(0.16, 0.1 * nose.length), largest))
+    edges = [0.0, 0.0]
     if fins is not None:
-        chord = fins.root_chord
-        lead, trail = Anchor(fins.root_leading_edge, 0.09 * chord), Anchor(fins.trailing_edge, 0.14 * chord)
-        if lead.x <= anchors[-1].x + 1e-9:
+        chord, edges = fins.root_chord, [fins.root_leading_edge, fins.trailing_edge]
+        if edges[0] <= anchors[-1].x + 1e-9:
             anchors.pop()
-        anchors.append(lead)
+        anchors.append(Anchor(edges[0], 0.08 * chord, 0.12 * chord))
         if fins.section == "double_wedge":
-            anchors.append(Anchor(0.5 * (lead.x + trail.x), 0.1 * chord))
-        anchors.append(trail)
+            anchors.append(Anchor(0.5 * (edges[0] + edges[1]), 0.09 * chord, 0.12 * chord))
+        anchors.append(Anchor(edges[1], 0.12 * chord, largest))
     if anchors[-1].x < body.length - 1e-9:
-        anchors.append(Anchor(body.length, largest))
-    stations, at = axial_stations(anchors, factor, largest)
-    stations[at[1]] = 0.0
-    if fins is None:
-        return stations, 0, 0
-    i_trail = at[[a.x for a in anchors].index(fins.trailing_edge)]
-    return stations, at[[a.x for a in anchors].index(fins.root_leading_edge)], i_trail
+        anchors.append(Anchor(body.length, largest, largest))
+    stations, at = axial_stations(anchors, factor)
+    index = {anchor.x: i for anchor, i in zip(anchors, at, strict=True)}
+    return stations, index[edges[0]], index[edges[1]]
 
 
 def _levels_with_tip(
@@ -246,29 +243,32 @@ def _columns(sector: Sector, factor: float) -> Array:
     return azimuthal_fractions(n, sector.start_fin is not None, sector.end_fin is not None)
 
 
-def _sector_nodes(frame: _Frame, sector: Sector, fractions: Array) -> Array:
+def _sector_nodes(frame: _Frame, sector: Sector, fractions: Array, fins: FinSet | None) -> Array:
     """Nodes (ni, nj, nk, 3) of one sector, from sheet to sheet or plane of symmetry."""
-    ends = []
-    for angle, fin, side in ((sector.start, sector.start_fin, 1.0), (sector.end, sector.end_fin, -1.0)):
-        if fin is None:
-            ends.append((frame.x, np.full_like(frame.s, angle), frame.s))
-        else:
-            safe = np.where(frame.sheet_s > 0.0, frame.sheet_s, 1.0)
-            turn = np.arctan2(side * frame.sheet_h, safe)
-            ends.append((frame.sheet_x, angle + turn, np.hypot(frame.sheet_s, frame.sheet_h)))
-    (x_a, angle_a, r_a), (x_b, angle_b, r_b) = ends
+    x_a, angle_a, r_a = _edge(frame, sector.start, sector.start_fin, 1.0)
+    x_b, angle_b, r_b = _edge(frame, sector.end, sector.end_fin, -1.0)
     near_a, near_b = (1.0 - fractions) ** 3, fractions**3
     x = frame.x[..., None] + (x_a - frame.x)[..., None] * near_a + (x_b - frame.x)[..., None] * near_b
     radius = frame.s[..., None] + (r_a - frame.s)[..., None] * near_a + (r_b - frame.s)[..., None] * near_b
-    angle = angle_a[..., None] * (1.0 - fractions) + angle_b[..., None] * fractions
-    points = np.stack([x, radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
-    for k, azimuth, fin, side in ((0, sector.start, sector.start_fin, 1.0), (-1, sector.end, sector.end_fin, -1.0)):
-        if fin is not None:  # in the fin's own axes, so that the two sheets agree to the last bit where they meet
-            _place_sheet(points[:, :, k], frame, azimuth % (2.0 * np.pi), side)
+    azimuth = angle_a[..., None] * (1.0 - fractions) + angle_b[..., None] * fractions
+    points = np.stack([x, radius * np.cos(azimuth), radius * np.sin(azimuth)], axis=-1)
+    if fins is not None:
+        for k, fin, side in ((0, sector.start_fin, 1.0), (-1, sector.end_fin, -1.0)):
+            if fin is not None:
+                _place_sheet(points[:, :, k], frame, float(fins.angles[fin]), side)
     return points
 
 
+def _edge(frame: _Frame, azimuth: float, fin: int | None, side: float) -> tuple[Array, Array, Array]:
+    """Axial station, azimuth and radius (ni, nj) of the nodes at one end of a sector."""
+    if fin is None:
+        return frame.x, np.full_like(frame.s, azimuth), frame.s
+    turn = np.arctan2(side * frame.sheet_h, frame.sheet_s)
+    return frame.sheet_x, azimuth + turn, np.hypot(frame.sheet_s, frame.sheet_h)
+
+
 def _place_sheet(points: Array, frame: _Frame, azimuth: float, side: float) -> None:
+    """Put nodes on one face of a fin, in the fin's own axes: both faces agree to the last bit where they meet."""
     cosine, sine = math.cos(azimuth), math.sin(azimuth)
     points[..., 0] = frame.sheet_x
     points[..., 1] = frame.sheet_s * cosine - side * frame.sheet_h * sine

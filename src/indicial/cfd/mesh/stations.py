@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,23 +18,25 @@ from indicial.cfd.mesh.structured import geometric, two_sided
 
 @dataclass(frozen=True)
 class Anchor:
-    """A station x that the mesh must have, and the step wanted there; steps grow by `growth` per length away from it."""
+    """A station x that the mesh must have, the step wanted there, and the largest one up to the next anchor."""
 
     x: float
     step: float
-    growth: float = 0.3
+    largest: float
 
 
-def axial_stations(anchors: Sequence[Anchor], factor: float, largest: float) -> tuple[Array, list[int]]:
+def axial_stations(anchors: Sequence[Anchor], factor: float, growth: float = 0.3) -> tuple[Array, list[int]]:
     """Stations through all anchors, and the indices of the anchors.
 
-    At factor 1 the step at x is ``min over anchors (step + growth |x - x_a|)``, at most `largest`; there are `factor`
-    times as many steps between any two anchors.
+    At factor 1 the step at x is the least of `largest` and of ``step + growth |x - x_a|`` over the anchors; there are
+    `factor` times as many steps between any two anchors.
     """
     stations, at = [np.array([anchors[0].x])], [0]
-    for left, right in zip(anchors[:-1], anchors[1:], strict=True):
+    for left, right in pairwise(anchors):
         x = np.linspace(left.x, right.x, 401)
-        step = np.min([a.step + a.growth * np.abs(x - a.x) for a in anchors] + [np.full(x.size, largest)], axis=0)
+        step = np.full(x.size, left.largest)
+        for anchor in anchors:
+            step = np.minimum(step, anchor.step + growth * np.abs(x - anchor.x))
         count = np.concatenate([[0.0], np.cumsum(0.5 * (1.0 / step[1:] + 1.0 / step[:-1]) * np.diff(x))])
         n = max(1, round(factor * max(1, round(count[-1]))))
         inner = np.interp(np.linspace(0.0, count[-1], n + 1), count, x)
