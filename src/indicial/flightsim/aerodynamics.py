@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 import casadi as ca
 import numpy as np
 
-from indicial.conventions import Array, ReferenceQuantities
+from indicial.conventions import Array, ReferenceQuantities, transfer_longitudinal
 from indicial.derivatives import DerivativeTable
 from indicial.errors import InputError
 
@@ -178,6 +178,18 @@ class SymmetricMissile(ABC):
     def plane(self, flow: FlowState, incidence: Any, rate: Any, turning: Any, lag: Any) -> tuple[Any, Any]:
         """Normal force [N] and moment [N m] of one plane."""
 
+    @abstractmethod
+    def lag_rate(self, flow: FlowState, lag: Any) -> Any:
+        """Time derivative of the lag states [1/s], pitch plane then yaw plane."""
+
+    @abstractmethod
+    def summary(self) -> str:
+        """The model in one line."""
+
+    @abstractmethod
+    def quasi_steady(self) -> DerivativeAerodynamics:
+        """The derivatives of the model at k = 0."""
+
     @property
     @abstractmethod
     def lag_names(self) -> tuple[str, ...]:
@@ -289,6 +301,25 @@ class DerivativeAerodynamics(SymmetricMissile):
     def quasi_steady(self) -> DerivativeAerodynamics:
         """Itself."""
         return self
+
+    def about(self, moment_reference: tuple[float, float, float]) -> DerivativeAerodynamics:
+        """The model about another point of the body's axis, by `indicial.conventions.transfer_longitudinal`.
+
+        The loads at the centre of gravity stay the same to first order, but for the rate of q: alphadot at one point
+        is alphadot at the other and a term in qdot, which derivatives have no place for.
+
+        Raises
+        ------
+        InputError
+            If the points are not on one line along x.
+        """
+        here = self.reference.moment_reference
+        if here[1:] != moment_reference[1:]:
+            raise InputError(f"derivatives can be moved along x only, not from {here} to {moment_reference}")
+        shift = (moment_reference[0] - here[0]) / self.reference.length
+        longitudinal = {name: getattr(self, name) for name in DERIVATIVES if name not in ("CA_0", "Cl_p")}
+        moved: dict[str, Any] = transfer_longitudinal(longitudinal, shift, self.reference.rate_normalisation)
+        return replace(self, reference=self.reference.about(moment_reference), **moved)
 
     def plane(self, flow: FlowState, incidence: Any, rate: Any, turning: Any, lag: Any) -> tuple[Any, Any]:
         """Normal force [N] and moment [N m] of one plane."""

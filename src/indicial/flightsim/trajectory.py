@@ -345,10 +345,11 @@ class Trajectory:
             f"  Mach {self.mach[0]:.4g} to {self.mach[-1]:.4g}, total angle of attack up to "
             f"{math.degrees(np.max(self.total_angle)):.4g} deg, roll rate {self.rate[-1, 0]:.4g} rad/s at the end",
         ]
-        if "position_error_m" in self.provenance:
+        made = self.provenance
+        if "position_error_m" in made:
             lines.append(
-                f"  {self.provenance['method']}, step {self.provenance['step_s']:.3g} s; error by halving it: "
-                f"position {self.provenance['position_error_m']:.2g} m, attitude {self.provenance['attitude_error_rad']:.2g} rad"
+                f"  {made['method']}, step {made['step_s']:.3g} s; error by halving it: "
+                f"position {made['position_error_m']:.2g} m, attitude {made['attitude_error_rad']:.2g} rad"
             )
         outside = int(np.count_nonzero(self.outside_range))
         if outside:
