@@ -1,5 +1,6 @@
 """The face-based mesh, its generators, its checks, reading and writing."""
 
+from indicial.cfd.mesh.airfoil import airfoil_mesh
 from indicial.cfd.mesh.box import box_mesh
 from indicial.cfd.mesh.finned_body import RESOLUTIONS, Resolution, cone_mesh, finned_body_mesh
 from indicial.cfd.mesh.hexahedra import PatchSides
@@ -16,6 +17,7 @@ __all__ = [
     "PatchKind",
     "PatchSides",
     "Resolution",
+    "airfoil_mesh",
     "box_mesh",
     "cone_mesh",
     "finned_body_mesh",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -87,6 +88,17 @@ class Airfoil:
         z, slope = self.camber_line(x)
         along = side * self.half_thickness(x) / np.sqrt(1.0 + slope**2)
         return np.stack([x - along * slope, z + along], axis=-1)
+
+    @property
+    def nose_radius(self) -> float:
+        """Radius of curvature of the leading edge, fraction of the chord: ``1.1019 t^2``."""
+        return float(0.5 * self._coefficients[0] ** 2)
+
+    @property
+    def trailing_edge_angle(self) -> float:
+        """Angle between the upper and lower surface at a closed trailing edge [rad]."""
+        slope = float(self._coefficients @ np.array([0.5, 1.0, 2.0, 3.0, 4.0]))
+        return 2.0 * math.atan(-slope)
 
     @property
     def area(self) -> float:
