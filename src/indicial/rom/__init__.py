@@ -1,1 +1,30 @@
-"""rom"""
+"""Reduced-order models: step responses in, loads under any motion out; each model is a `Solver`."""
+
+from indicial.rom.check import CheckedCoefficient, PredictionCheck, check_prediction
+from indicial.rom.convolution import ConvolutionModel
+from indicial.rom.deficiency import DeficiencyIntegral, deficiency, deficiency_integral
+from indicial.rom.model import ReducedModel
+from indicial.rom.quasi_steady import QuasiSteadyError, QuasiSteadyModel, quasi_steady_error
+from indicial.rom.realisation import realise
+from indicial.rom.response import StepResponse, StepResponses
+from indicial.rom.state_space import Candidate, ChannelError, StateSpaceModel
+
+__all__ = [
+    "Candidate",
+    "ChannelError",
+    "CheckedCoefficient",
+    "ConvolutionModel",
+    "DeficiencyIntegral",
+    "PredictionCheck",
+    "QuasiSteadyError",
+    "QuasiSteadyModel",
+    "ReducedModel",
+    "StateSpaceModel",
+    "StepResponse",
+    "StepResponses",
+    "check_prediction",
+    "deficiency",
+    "deficiency_integral",
+    "quasi_steady_error",
+    "realise",
+]
