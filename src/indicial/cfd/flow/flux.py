@@ -15,7 +15,7 @@ from indicial.cfd.flow.gas import GAMMA
 GM1 = GAMMA - 1.0
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def physical_flux(r, u, v, w, p, nx, ny, nz, ug):  # type: ignore[no-untyped-def]
     """The flux of one state: supersonic outflow."""
     un = u * nx + v * ny + w * nz
@@ -24,7 +24,7 @@ def physical_flux(r, u, v, w, p, nx, ny, nz, ug):  # type: ignore[no-untyped-def
     return m, m * u + p * nx, m * v + p * ny, m * w + p * nz, energy * (un - ug) + p * un
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def hllc(rl, ul, vl, wl, pl, rr, ur, vr, wr, pr, nx, ny, nz, ug):  # type: ignore[no-untyped-def]
     """HLLC (Toro, Spruce & Speares 1994) with the wave speeds of Einfeldt, in the frame of the moving face."""
     unl = ul * nx + vl * ny + wl * nz
@@ -87,7 +87,7 @@ def hllc(rl, ul, vl, wl, pl, rr, ur, vr, wr, pr, nx, ny, nz, ug):  # type: ignor
     )
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def wall_pressure(r, u, v, w, p, nx, ny, nz, ug):  # type: ignore[no-untyped-def]
     """Pressure on a slip wall that moves at u_g: the exact Riemann problem of the state and its mirror image.
 
@@ -106,7 +106,7 @@ def wall_pressure(r, u, v, w, p, nx, ny, nz, ug):  # type: ignore[no-untyped-def
     return p * base ** (2.0 * GAMMA / GM1)
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def wall_flux(r, u, v, w, p, nx, ny, nz, ug):  # type: ignore[no-untyped-def]
     """No mass passes: pressure, and the work that the moving wall does."""
     ps = wall_pressure(r, u, v, w, p, nx, ny, nz, ug)

@@ -23,7 +23,7 @@ from indicial.conventions import Array
 _H = 1e-40
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _linearise_side(q, g, c, other, k, rx, ry, rz, dx, dy, dz, eps, out):  # type: ignore[no-untyped-def]
     """Value of variable k at the face and its slopes: own cell, other cell, dg.r, dg.d."""
     b = q[other, k] - q[c, k]
@@ -44,7 +44,9 @@ def _linearise_side(q, g, c, other, k, rx, ry, rz, dx, dy, dz, eps, out):  # typ
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def _linearise_faces(q, g, velocity, omega, owner, neighbour, kind, normal, area, moment, ri, rj, eps, far, dl, dr, lin):  # type: ignore[no-untyped-def]
+def _linearise_faces(
+    q, g, velocity, omega, owner, neighbour, kind, normal, area, moment, ri, rj, eps, far, dl, dr, lin
+):  # type: ignore[no-untyped-def]
     """Flux derivatives dl, dr (nf, 5, 5), (ni, 5, 5) and reconstruction slopes lin (nf, 2, 5, 4)."""
     ni = neighbour.shape[0]
     for f in prange(owner.shape[0]):

@@ -52,7 +52,7 @@ def least_squares_weights(owner: Array, neighbour: Array, centres: Array, offset
     return weights
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def limiter(a, b, eps):  # type: ignore[no-untyped-def]
     """psi(a, b) and its two slopes."""
     den = a * a + b * b + 2.0 * eps
@@ -64,7 +64,7 @@ def limiter(a, b, eps):  # type: ignore[no-untyped-def]
     return psi, -2.0 * a * psi / den, -2.0 * b * psi / den
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def saturate(x, q):  # type: ignore[no-untyped-def]
     """``x / sqrt(1 + (x/(beta q))^2)`` and its slopes in x and q."""
     t = x / (SATURATION * q)

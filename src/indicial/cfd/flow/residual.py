@@ -40,7 +40,7 @@ def gradients(q, offsets, cells, weights, out):  # type: ignore[no-untyped-def]
                     out[c, k, 2] += wz * dq
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _face_value(q, g, c, other, k, rx, ry, rz, dx, dy, dz, eps):  # type: ignore[no-untyped-def]
     """Variable k of cell c at a face shared with cell `other`; (dx, dy, dz) leads from c to it."""
     b = q[other, k] - q[c, k]
@@ -52,7 +52,7 @@ def _face_value(q, g, c, other, k, rx, ry, rz, dx, dy, dz, eps):  # type: ignore
     return q[c, k] + x
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _boundary_value(q, g, c, k, rx, ry, rz):  # type: ignore[no-untyped-def]
     """Variable k of cell c extrapolated to a boundary face."""
     x = g[c, k, 0] * rx + g[c, k, 1] * ry + g[c, k, 2] * rz
@@ -61,7 +61,7 @@ def _boundary_value(q, g, c, k, rx, ry, rz):  # type: ignore[no-untyped-def]
     return q[c, k] + x
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def boundary_flux(kind, r, u, v, w, p, far, nx, ny, nz, ug):  # type: ignore[no-untyped-def]
     """Flux through a boundary face; symmetry planes are slip walls whose loads do not count."""
     if kind == FARFIELD:

@@ -1,1 +1,8 @@
-"""cfd/march"""
+"""Steady and unsteady solution of the flow residual."""
+
+from indicial.cfd.march.ilu import BlockILU, Pattern
+from indicial.cfd.march.krylov import KrylovResult, gmres
+from indicial.cfd.march.steady import SteadyState, converge
+from indicial.cfd.march.unsteady import March, march
+
+__all__ = ["BlockILU", "KrylovResult", "March", "Pattern", "SteadyState", "converge", "gmres", "march"]

@@ -20,7 +20,9 @@ class KrylovResult(NamedTuple):
     products: int
 
 
-def gmres(apply: Operator, precondition: Operator, b: Array, tolerance: float, restart: int = 40, restarts: int = 4) -> KrylovResult:
+def gmres(
+    apply: Operator, precondition: Operator, b: Array, tolerance: float, restart: int = 40, restarts: int = 4
+) -> KrylovResult:
     """Solve ``A x = b`` by restarted GMRES (Saad & Schultz 1986), ``x = M^-1 y``.
 
     Classical Gram-Schmidt is run twice: as stable as the modified one and all in matrix-vector products.

@@ -150,7 +150,9 @@ def _iterate(
             q, r, norm = trial, r_trial, norm_trial
             norms.append(norm)
             if progress is not None:
-                progress(float(np.clip(np.log(first / norm) / np.log(first / tolerance), 0.0, 1.0)) if norm < first else 0.0)
+                progress(
+                    float(np.clip(np.log(first / norm) / np.log(first / tolerance), 0.0, 1.0)) if norm < first else 0.0
+                )
         else:
             cfl *= 0.1
             if cfl < 1e-4 * lowest_cfl:

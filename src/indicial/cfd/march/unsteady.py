@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 
 MotionAt = Callable[[float], MeshMotion]
 
-_NEWTON_STEPS = 12
+_NEWTON_STEPS = 20
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,15 @@ def march(
         c0, c1, c2 = (1.0 + 2.0 * ratio) / (1.0 + ratio), -(1.0 + ratio), ratio**2 / (1.0 + ratio)
         known = (volume / dt)[:, None] * (c1 * conservative(q) + c2 * conservative(before))
         try:
-            new, used, left = _step(residual, stepper, q + ratio * (q - before), known, c0 / dt, motion_at(float(times[m])), tolerance * scale)
+            new, used, left = _step(
+                residual,
+                stepper,
+                q + ratio * (q - before),
+                known,
+                c0 / dt,
+                motion_at(float(times[m])),
+                tolerance * scale,
+            )
         except DivergenceError as error:
             where = f"at t = {times[m]:.4g} c/a (step {m} of {n - 1})"
             saved = ""
@@ -186,7 +194,7 @@ def _step(
             return q, used, norm
         q_new = q - stepper.solve(r, shift, max(0.3 * target / norm, 1e-4))
         r, norm_new = unsteady_residual(q_new)
-        if not norm_new < 0.5 * norm:
+        if not norm_new < 0.2 * norm:
             if not (np.isfinite(norm_new) and np.all(q_new[:, 0] > 0.0) and np.all(q_new[:, 4] > 0.0)):
                 q_new = q
             stepper.linearise(q_new, motion)
