@@ -389,8 +389,8 @@ def _remainder(
         octave = abs(law.between(cut, 2.0 * cut)) / size
         if octave > SLOW_OCTAVE:
             raise NoLimitError(
-                f"{name}: the deficiency falls like 1/s^{exponent:.2f} up to s = {cut:.4g}, not to be told from the 1/s of "
-                f"a two-dimensional subsonic wake, so its integral has no limit (each doubling of s adds "
+                f"{name}: the deficiency falls like 1/s^{exponent:.2f} up to s = {cut:.4g}, not to be told from the "
+                f"1/s of a two-dimensional subsonic wake, so its integral has no limit (each doubling of s adds "
                 f"{100.0 * octave:.0f}%); if the body is finite, run to larger s"
             )
         return "slow", exponent, 0.0, abs(law.between(cut, 10.0 * cut))
