@@ -247,7 +247,8 @@ def _sector_nodes(frame: _Frame, sector: Sector, fractions: Array, fins: FinSet 
     """Nodes (ni, nj, nk, 3) of one sector, from sheet to sheet or plane of symmetry."""
     x_a, angle_a, r_a = _edge(frame, sector.start, sector.start_fin, 1.0)
     x_b, angle_b, r_b = _edge(frame, sector.end, sector.end_fin, -1.0)
-    near_a, near_b = (1.0 - fractions) ** 3, fractions**3
+    reach = 0.5 if sector.start_fin is not None and sector.end_fin is not None else 1.0
+    near_a, near_b = (np.maximum(0.0, 1.0 - away / reach) ** 3 for away in (fractions, 1.0 - fractions))
     x = frame.x[..., None] + (x_a - frame.x)[..., None] * near_a + (x_b - frame.x)[..., None] * near_b
     radius = frame.s[..., None] + (r_a - frame.s)[..., None] * near_a + (r_b - frame.s)[..., None] * near_b
     azimuth = angle_a[..., None] * (1.0 - fractions) + angle_b[..., None] * fractions

@@ -97,8 +97,9 @@ class Airfoil:
     @property
     def trailing_edge_angle(self) -> float:
         """Angle between the upper and lower surface at a closed trailing edge [rad]."""
-        slope = float(self._coefficients @ np.array([0.5, 1.0, 2.0, 3.0, 4.0]))
-        return 2.0 * math.atan(-slope)
+        thinning = -float(self._coefficients @ np.array([0.5, 1.0, 2.0, 3.0, 4.0]))
+        camber_slope = float(self.camber_line(1.0)[1])
+        return 2.0 * math.atan(thinning / math.hypot(1.0, camber_slope))
 
     @property
     def area(self) -> float:
