@@ -249,7 +249,8 @@ def _flow(air: Air, velocity: Any, rate: Any, turning: Any) -> FlowState:
 def _solve_turning(turning: Any, flow: FlowState, velocity: Any, rate: Any, arm: Any, acceleration: Any) -> Any:
     """The T with ``T = T(accelerations(T))``, for accelerations of the moment reference point linear in T."""
     direction = (velocity + ca.cross(rate, arm)) / flow.speed
-    implied = (acceleration - direction * ca.dot(direction, acceleration))[1:]
+    # V de/dt = (e.e) a - e (e.a): nothing at rest, where e = 0
+    implied = (ca.sumsqr(direction) * acceleration - direction * ca.dot(direction, acceleration))[1:]
     slope = ca.jacobian(implied, turning)
     constant = ca.substitute(implied, turning, ca.DM.zeros(2, 1))
     if slope.nnz() == 0:

@@ -1,0 +1,1 @@
+"""Tests of flight: motion, aerodynamics, modes and damping against exact results."""

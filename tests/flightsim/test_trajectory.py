@@ -1,0 +1,135 @@
+"""Trajectories: files, interpolation, comparison."""
+
+import math
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flightsim.support import FINNER, SPEED, derivative_model, first_order_lag
+from indicial.errors import InputError
+from indicial.flightsim import (
+    End,
+    FlatEarth,
+    InitialState,
+    Trajectory,
+    build_dynamics,
+    compare,
+    missile_modes,
+    simulate,
+)
+
+START = InitialState.from_path(SPEED, alpha=0.03, beta=0.01, rate=(200.0, 1.0, -2.0), position=(0.0, 0.0, -2.0))
+
+
+@pytest.fixture(scope="module")
+def flight() -> Trajectory:
+    return simulate(FINNER, first_order_lag(0.3), START, 0.02, step=1e-5)
+
+
+@pytest.mark.parametrize("suffix", ["nc", "csv"])
+def test_a_file_brings_every_digit_back(flight: Trajectory, tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"flight.{suffix}"
+    getattr(flight, {"nc": "to_netcdf", "csv": "to_csv"}[suffix])(path)
+    back = getattr(Trajectory, {"nc": "from_netcdf", "csv": "from_csv"}[suffix])(path)
+    for item in fields(Trajectory):
+        one, other = getattr(flight, item.name), getattr(back, item.name)
+        assert np.array_equal(one, other) if isinstance(one, np.ndarray) else one == other
+
+
+def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "other.csv"
+    path.write_text("# format: something\ntime\n0\n")
+    with pytest.raises(InputError, match="trajectory"):
+        Trajectory.from_csv(path)
+    with pytest.raises(InputError, match="no such"):
+        Trajectory.from_netcdf(tmp_path / "missing.nc")
+
+
+def test_a_file_that_lacks_a_column_is_refused(flight: Trajectory, tmp_path: Path) -> None:
+    path = tmp_path / "flight.csv"
+    flight.to_csv(path)
+    path.write_text(path.read_text().replace("q_rad_s", "q_deg_s"))
+    with pytest.raises(InputError, match="q_rad_s"):
+        Trajectory.from_csv(path)
+
+
+def test_interpolation_is_of_fourth_order_between_instants() -> None:
+    model, duration = derivative_model(), 0.04
+    exact = simulate(FINNER, model, START, duration, step=1e-4)
+    errors = []
+    for step in (2e-3, 1e-3):
+        coarse = exact.at_times(np.arange(0.0, duration + step / 2.0, step).clip(max=duration))
+        middle = coarse.time[5:-6] + step / 2.0
+        errors.append(np.max(np.abs(coarse.at_times(middle).velocity - exact.at_times(middle).velocity)))
+    assert np.log2(errors[0] / errors[1]) > 3.3
+
+
+def test_stations_are_met_and_bounds_are_kept(flight: Trajectory) -> None:
+    stations = np.array([0.5, 3.3, 12.0])
+    assert flight.at_stations(stations).position[:, 0] == pytest.approx(stations, abs=1e-11)
+    with pytest.raises(InputError, match="stations"):
+        flight.at_stations([1e3])
+    with pytest.raises(InputError, match="times"):
+        flight.at_times([-1.0])
+
+
+def test_coefficients_are_those_of_the_model() -> None:
+    model = derivative_model(CN_q=0.0, CN_alphadot=0.0, Cm_q=0.0, Cm_alphadot=0.0)
+    flown = simulate(FINNER, model, START, 0.01, step=1e-4)
+    side, normal = (flown.velocity[:, i] / flown.speed for i in (1, 2))
+    expected = np.stack(
+        [
+            np.full(len(flown), model.CA_0),
+            -model.CN_alpha * side,
+            model.CN_alpha * normal,
+            model.Cl_p * flown.rate[:, 0] * 0.03 / (2.0 * flown.speed),
+            model.Cm_alpha * normal,
+            -model.Cm_alpha * side,
+        ],
+        axis=1,
+    )
+    assert flown.coefficients == pytest.approx(expected, abs=1e-12)
+
+
+def test_non_rolling_incidence_does_not_see_the_roll() -> None:
+    """A missile without damping or spin inertia swings in a plane, whatever it rolls."""
+    model = derivative_model(Cl_p=0.0)
+    start = InitialState.from_path(SPEED, alpha=0.02, rate=(300.0, 0.0, 0.0))
+    vehicle = FINNER.__class__("thin", 1.6, np.diag([1e-9, 0.0098, 0.0098]), FINNER.reference, FINNER.centre_of_gravity)
+    xi = simulate(vehicle, model, start, 0.1, step=1e-4, earth=FlatEarth(0.0)).non_rolling_incidence
+    assert np.max(np.abs(xi.real)) < 1e-6
+    assert np.max(np.abs(xi.imag)) == pytest.approx(math.sin(0.02), rel=1e-6)
+
+
+def test_flight_compared_with_itself_shows_no_difference() -> None:
+    flown = simulate(FINNER, derivative_model(), START, 0.2, step=1e-4)
+    for aligned in ("time", "station"):
+        same = compare(flown, flown, aligned=aligned)
+        assert np.all(same.rms_position < 1e-12)
+        assert same.rms_incidence < 1e-14
+        assert all(abs(arm.damping) < 1e-9 and abs(arm.phase) < 1e-9 for arm in same.arms)
+
+
+def test_compared_flights_show_the_modes_difference_of_damping_and_phase() -> None:
+    models = (derivative_model(), derivative_model(Cm_q=-200.0, Cm_alpha=-27.5))
+    start = InitialState.from_path(SPEED, alpha=0.01)
+    one, other = (simulate(FINNER, m, start, 1.0, step=1e-4, end=End(x=180.0), earth=FlatEarth(0.0)) for m in models)
+    found = compare(one, other, aligned="station")
+    modes = [missile_modes(build_dynamics(FINNER, m), SPEED)["fast arm"].per_metre for m in models]
+    change = modes[1] - modes[0]
+    fast = found.arms[0]
+    speed = float(np.mean(found.first.speed))
+    assert fast.damping / speed == pytest.approx(change.real, rel=1e-3)
+    assert fast.frequency / speed == pytest.approx(change.imag, rel=1e-3)
+    assert fast.phase == pytest.approx(change.imag * 180.0, abs=0.02)
+    assert "damping" in found.summary()
+
+
+def test_pictures_are_drawn(flight: Trajectory) -> None:
+    import matplotlib.pyplot as plt
+
+    assert len(flight.plot().axes) == 4
+    assert len(compare(flight, flight, arms=False).plot().axes) == 3
+    plt.close("all")
