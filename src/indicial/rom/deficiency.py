@@ -39,6 +39,10 @@ WINDOW = 12.0
 SLOW_OCTAVE = 0.03
 """A tail without a limit is let pass, with its error bar, if one more octave of s would add less than this."""
 
+MISMATCH = 0.01
+"""A response may level off this much away from the final value given, of the largest F. Its own level is used then, and
+the difference, times `cut`, is in the error bar."""
+
 MISSING = 0.3
 """At most this part of the integral may be extrapolated beyond the record."""
 
@@ -58,7 +62,7 @@ class DeficiencyIntegral:
     cut : float
         Reduced time up to which the samples were integrated: where F went quiet, or the end of the record.
     final : float
-        C(inf).
+        C(inf) that was used.
     tail : str
         ``none`` (no deficiency above the noise), ``finite`` (settles in finite time), ``exponential``, ``algebraic``,
         ``slow`` (too slow for a limit, but too small to matter), ``irregular`` (an oscillation).
@@ -150,8 +154,9 @@ def deficiency_integral(
     The samples are integrated up to where F goes quiet (or the record ends). Before that, over about the last decade
     of F, ``F = F0 (1 + xi (s - s0)/sigma)^(-1/xi)`` is fitted: its xi tells a tail that ends in finite time (xi < 0),
     an exponential (0), and ``1/s^n`` with n = 1/xi, whose integral has no limit for xi >= 1; the same law gives the
-    remainder ``sigma F/(1 - xi)`` beyond. The fit is repeated on the later half of the window; the change is in
-    the error bar.
+    remainder ``sigma F/(1 - xi)`` beyond. The fit is repeated on the later half of the window; twice the
+    change is in the error bar. Where F follows no such law, as in an oscillation, no remainder is added and the error
+    bar is that of an envelope that goes on falling at the window's rate.
 
     Parameters
     ----------
@@ -160,7 +165,7 @@ def deficiency_integral(
     response : array_like
         C(s) per unit step, shape (n,).
     final : float, optional
-        C(inf), from a steady solution of the same solver after the step. Without it, it is estimated
+        C(inf), from a steady solution of the same solver after the step (see `MISMATCH`). Without it, it is estimated
         with the tail's law, which needs a record that has all but settled.
     noise : float
         What is not resolved in the response, of the largest |F|. Scatter in the record counts if it is larger.
@@ -178,7 +183,11 @@ def deficiency_integral(
     """
     at, values = _checked(s, response, name)
     scatter = _scatter(at, values)
-    guess = float(np.median(values[at >= 0.9 * at[-1]])) if final is None else final
+    if final is None:
+        guess = float(np.median(values[at >= 0.9 * at[-1]]))
+    else:
+        mismatch = _mismatch(at, final - values, max(noise * float(np.max(np.abs(final - values))), scatter), name)
+        guess, final_uncertainty = final - mismatch, math.hypot(final_uncertainty, mismatch)
     for _ in range(12):
         f = guess - values
         scale = float(np.max(np.abs(f)))
@@ -261,8 +270,6 @@ def _judge(s: Array, f: Array, nu: float, *, free: bool, name: str) -> _Judged:
     last = float(np.max(np.abs(f[s >= 0.9 * s[-1]])))
     settled = last <= QUIET * nu
     level = max(QUIET * nu, last)
-    if not settled and not free:
-        _refuse_plateau(s, f, name)
     end = _last_above(f, level) + 1 if settled else s.size - 1
     end = min(max(end, 1), s.size - 1)
     first = max(_last_above(f, WINDOW * level), 0)
@@ -283,13 +290,18 @@ def _last_above(f: Array, level: float) -> int:
     return int(above[-1]) if above.size else -1
 
 
-def _refuse_plateau(s: Array, f: Array, name: str) -> None:
-    late = f[s >= 0.5 * s[-1]]
-    if np.ptp(late) < 0.1 * abs(float(np.mean(late))):
+def _mismatch(s: Array, f: Array, nu: float, name: str) -> float:
+    """How far off its given final value the response levels out; 0 while it still falls, or within the noise."""
+    curve, quarter = PchipInterpolator(s, f), 0.25 * float(s[-1])
+    third, fourth = (float(curve.integrate(i * quarter, (i + 1) * quarter)) / quarter for i in (2, 3))
+    if abs(fourth) <= QUIET * nu or abs(third - fourth) > 0.1 * abs(fourth):
+        return 0.0
+    if abs(fourth) > MISMATCH * float(np.max(np.abs(f))):
         raise InputError(
-            f"{name}: the response levels off {float(np.mean(late)):.3g} away from its final value over the last half "
-            f"of the record: give the final value of the same solver and step, or run far beyond s = {s[-1]:.4g}"
+            f"{name}: the response levels off {fourth:.3g} away from its final value over the last half of the record: "
+            f"give the final value of the same solver and step, or run far beyond s = {s[-1]:.4g}"
         )
+    return fourth
 
 
 def _fit(s: Array, f: Array, nu: float, free: bool) -> tuple[_TailLaw, Callable[[float], float]]:
@@ -330,7 +342,8 @@ def _fit(s: Array, f: Array, nu: float, free: bool) -> tuple[_TailLaw, Callable[
         here = total(parameters)
         steps = 1e-4 * np.maximum(np.sqrt(np.diag(covariance)), 1e-8)
         slope = np.array([(total(parameters + np.eye(steps.size)[i] * h) - here) / h for i, h in enumerate(steps)])
-        return math.hypot(math.sqrt(max(float(slope @ covariance @ slope), 0.0)), total(late) - here)
+        # twice the change: halving the window again and again would go on changing it
+        return math.hypot(math.sqrt(max(float(slope @ covariance @ slope), 0.0)), 2.0 * (total(late) - here))
 
     return fitted, error
 
@@ -383,7 +396,8 @@ def _remainder(
     """Kind of tail, exponent, integral beyond the cut and its error."""
     cut = judged.cut
     if law is None:
-        return "finite" if judged.abrupt else "irregular", None, 0.0, judged.level * max(cut - judged.start, 0.0)
+        spread = judged.level * (cut - judged.start) / math.log(WINDOW)
+        return "finite" if judged.abrupt else "irregular", None, 0.0, spread
     exponent = 1.0 / law.xi if law.xi > 1.0 / EXPONENTIAL_EXPONENT else None
     if exponent is not None and exponent < NO_LIMIT_EXPONENT:
         octave = abs(law.between(cut, 2.0 * cut)) / size
