@@ -236,4 +236,4 @@ def test_signals_are_taken_by_name() -> None:
         assert np.array_equal(one, other)
     renamed = control.ss(s.A, s.B, s.C, s.D, inputs=["beta", "r"], outputs=["CY", "Cn"])
     with pytest.raises(InputError, match="beta"):
-        _ = replace(model, system=renamed).matrices
+        replace(model, system=renamed)

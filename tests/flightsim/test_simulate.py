@@ -54,6 +54,21 @@ def test_a_long_flight_is_marched_in_blocks_without_a_seam() -> None:
     assert whole.time[-1] == 0.0505
 
 
+def test_keeping_every_tenth_step_changes_no_number() -> None:
+    every, tenth = (
+        simulate(FINNER, derivative_model(), START, 1.0, step=1e-4, every=n, end=End(x=20.00123)) for n in (1, 10)
+    )
+    assert np.array_equal(tenth.position[:-1], every.position[:-1:10])
+    assert tenth.position[-1] == pytest.approx(every.position[-1], abs=1e-14)
+    assert tenth.provenance["position_error_m"] == pytest.approx(every.provenance["position_error_m"], rel=0.1)
+
+
+def test_fast_lags_take_short_steps_but_keep_few_instants() -> None:
+    lagged, quasi = (simulate(FINNER, model, START, 0.05) for model in (first_order_lag(0.5), derivative_model()))
+    assert lagged.provenance["step_s"] < 0.02 * quasi.provenance["step_s"]
+    assert len(lagged) < 2 * len(quasi)
+
+
 def test_last_step_is_shortened_to_the_duration() -> None:
     flight = simulate(FINNER, derivative_model(), START, 0.0105, step=2e-4)
     truth = simulate(FINNER, derivative_model(), START, 0.0105, step=2e-4, method="dop853")

@@ -353,7 +353,8 @@ class StateSpaceAerodynamics(SymmetricMissile):
     ----------
     system : control.StateSpace
         Inputs alpha and ``q c/2V``, outputs CN and Cm, increments about zero incidence, time in s; taken by
-        name if the system's signals are named ``alpha``, ``q``, ``CN`` and ``Cm``, in this order if not named.
+        name if the system's signals are named ``alpha``, ``q``, ``CN`` and ``Cm`` (further outputs are left alone),
+        in this order if not named.
 
     Raises
     ------
@@ -370,11 +371,13 @@ class StateSpaceAerodynamics(SymmetricMissile):
                 "a state-space model's rate input is q c/2V: its reference must say rate_normalisation c/2V"
             )
         system = self.system
-        if (system.noutputs, system.ninputs) != (2, 2):
+        if system.ninputs != 2 or system.noutputs < 2:
             raise InputError(
-                f"a state-space model needs outputs (CN, Cm) and inputs (alpha, q c/2V), "
-                f"this one has {system.noutputs} and {system.ninputs}"
+                f"a state-space model needs inputs (alpha, q c/2V) and outputs (CN, Cm), "
+                f"this one has {system.ninputs} and {system.noutputs}"
             )
+        _order(system.input_labels, ("alpha", "q"))
+        _order(system.output_labels, ("CN", "Cm"))
         if system.dt:
             raise InputError(f"a state-space model must be in continuous reduced time, this one has dt = {system.dt}")
         if system.nstates and np.max(np.linalg.eigvals(system.A).real) >= 0.0:
@@ -458,6 +461,6 @@ def _order(labels: list[str], wanted: tuple[str, ...]) -> list[int]:
     """Where the wanted signals stand: by name if the system names them, in order if it has default names."""
     if all(name in labels for name in wanted):
         return [labels.index(name) for name in wanted]
-    if all("[" in label for label in labels):
+    if len(labels) == len(wanted) and all("[" in label for label in labels):
         return list(range(len(wanted)))
     raise InputError(f"a state-space model's signals are named {labels}, must be {list(wanted)}")

@@ -278,9 +278,11 @@ def check_damping(
     decay = 2.0 * slowing / speed  # of V over distance: V = V0 exp(-decay s)
     duration = math.expm1(decay * distance) / (decay * speed) if decay else distance / speed
     initial = InitialState.from_path(speed, alpha=amplitude, rate=(roll_rate, 0.0, 0.0), position=(0.0, 0.0, -altitude))
+    every = None
     if step is None:
-        step = 0.5 * suggest_step(dynamics, dynamics.initial_vector(initial), np.zeros(0), duration)
-    trajectory = fly(dynamics, initial, duration, step=step)
+        step, kept = suggest_step(dynamics, dynamics.initial_vector(initial), np.zeros(0), duration)
+        step, every = 0.5 * step, 2 * kept
+    trajectory = fly(dynamics, initial, duration, step=step, every=every)
     transient = max((10.0 / abs(mode.per_metre.real) for mode in modes.lag), default=0.0)
     fit = fit_trajectory(trajectory, trim=False, skip=min(transient, 0.25 * distance))
     arms = tuple(

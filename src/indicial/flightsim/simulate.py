@@ -61,6 +61,7 @@ def simulate(
     duration: float,
     *,
     step: float | None = None,
+    every: int | None = None,
     end: End | None = None,
     method: Method = "rk4",
     atmosphere: Atmosphere | None = None,
@@ -69,7 +70,9 @@ def simulate(
 ) -> Trajectory:
     """Fly a vehicle: `build_dynamics`, then `fly`."""
     dynamics = build_dynamics(vehicle, aerodynamics, atmosphere, earth)
-    return fly(dynamics, initial, duration, step=step, end=end, method=method, estimate_error=estimate_error)
+    return fly(
+        dynamics, initial, duration, step=step, every=every, end=end, method=method, estimate_error=estimate_error
+    )
 
 
 def fly(
@@ -78,6 +81,7 @@ def fly(
     duration: float,
     *,
     step: float | None = None,
+    every: int | None = None,
     end: End | None = None,
     method: Method = "rk4",
     parameters: Mapping[str, float] | None = None,
@@ -92,8 +96,10 @@ def fly(
     duration : float
         [s]; the flight ends there at the latest.
     step : float, optional
-        [s] between the instants returned, and the step of "rk4". If not given, a tenth of the time constant of the
-        fastest eigenvalue at the start.
+        Of "rk4" [s]. If not given, see `suggest_step`.
+    every : int, optional
+        Every how many steps an instant is kept; the first and last always are. 1 if `step` is given, else by
+        `suggest_step`.
     end : End, optional
     method : {"rk4", "dop853"}
         Fixed-step Runge-Kutta of fourth order, marched inside CasADi; or SciPy's adaptive DOP853 at a tolerance
@@ -115,30 +121,41 @@ def fly(
         raise InputError(f"flight duration is {duration} s, must be positive and finite")
     values = dynamics.parameter_vector(parameters)
     start = dynamics.initial_vector(initial, values)
-    length = suggest_step(dynamics, start, values, duration) if step is None else step
-    if not (math.isfinite(length) and 0.0 < length <= duration) or duration / length > _MAX_STEPS:
-        raise InputError(f"step is {length} s, must be at most the duration and no less than 1/{_MAX_STEPS} of it")
+    if step is None:
+        step, kept = suggest_step(dynamics, start, values, duration)
+    else:
+        kept = 1
+    every = kept if every is None else every
+    if not (math.isfinite(step) and 0.0 < step <= duration) or duration / step > _MAX_STEPS:
+        raise InputError(f"step is {step} s, must be at most the duration and no less than 1/{_MAX_STEPS} of it")
+    if every < 1:
+        raise InputError(f"every is {every}, must be at least 1 (every step is kept)")
     end = End() if end is None else end
     if end.margins(dynamics, start[None, :]).min(initial=math.inf) <= 0.0:
         raise InputError("the flight starts beyond its end")
+    provenance: dict[str, Any] = {"method": method, "step_s": step, "every": every}
     if method == "dop853":
-        time, states = _adaptive(dynamics, start, values, duration, length, end)
-        return record(dynamics, time, states, values, {"method": method, "step_s": length})
-    if method != "rk4":
+        time, states = _adaptive(dynamics, start, values, duration, every * step, end)
+    elif method == "rk4":
+        time, states = _fixed_step(dynamics, start, values, duration, step, every, end)
+        if estimate_error:
+            finer = _fixed_step(dynamics, start, values, duration, step / 2.0, 2 * every, end)
+            provenance |= _difference(time, states, *finer)
+    else:
         raise InputError(f"method is {method!r}, must be 'rk4' or 'dop853'")
-    time, states = _fixed_step(dynamics, start, values, duration, length, end)
-    provenance: dict[str, Any] = {"method": method, "step_s": length}
-    if estimate_error:
-        provenance |= _difference(time, states, *_fixed_step(dynamics, start, values, duration, length / 2.0, end))
     return record(dynamics, time, states, values, provenance)
 
 
-def suggest_step(dynamics: Dynamics, state: Array, parameters: Array, duration: float) -> float:
-    """A tenth of the time constant of the fastest eigenvalue at `state`, at most a tenth of the flight [s]."""
+def suggest_step(dynamics: Dynamics, state: Array, parameters: Array, duration: float) -> tuple[float, int]:
+    """Step [s] and every how many of them to keep.
+
+    The step is a tenth of the time constant of the fastest eigenvalue at `state`, at most a tenth of the flight; the
+    instants kept are a tenth of the time constant of the rigid body apart (its lag states held), or closer.
+    """
     jacobian = np.array(dynamics.derivative.jacobian()(state, parameters, 0)[0])
-    fastest = float(np.max(np.abs(np.linalg.eigvals(jacobian[3:, 3:]))))
-    steps = math.ceil(max(10.0, duration * fastest / 0.1))
-    return duration / steps
+    fastest, rigid = (float(np.max(np.abs(np.linalg.eigvals(m)))) for m in (jacobian[3:, 3:], jacobian[3:13, 3:13]))
+    steps, instants = (math.ceil(max(10.0, duration * rate / 0.1)) for rate in (fastest, rigid))
+    return duration / steps, max(1, steps // instants)
 
 
 def record(dynamics: Dynamics, time: Array, states: Array, parameters: Array, provenance: dict[str, Any]) -> Trajectory:
@@ -184,17 +201,16 @@ def _outside(dynamics: Dynamics, trajectory: Trajectory, states: Array) -> NDArr
 
 
 def _fixed_step(
-    dynamics: Dynamics, start: Array, parameters: Array, duration: float, step: float, end: End
+    dynamics: Dynamics, start: Array, parameters: Array, duration: float, step: float, every: int, end: End
 ) -> tuple[Array, Array]:
-    """Instants (n,) and states (n, nx), the first included; the last step is cut to meet the end exactly."""
+    """Instants kept (n,) and states (n, nx), the first included; the last step is cut to meet the end exactly."""
     lengths = _step_lengths(duration, step)
     time = np.append(step * np.arange(lengths.size), duration)
-    blocks: list[Array] = [start[None, :]]
+    kept, blocks, before = [0], [start[None, :]], start
     for first in range(0, lengths.size, _BLOCK):
         chosen = lengths[first : first + _BLOCK]
         if first == 0 or chosen.size < _BLOCK:
             march = dynamics.march(chosen.size)
-        before = blocks[-1][-1]
         states = np.array(march(before, parameters, chosen[None, :])).T
         passed = np.any(end.margins(dynamics, states) <= 0.0, axis=0)
         flown = int(np.argmax(passed)) if np.any(passed) else chosen.size
@@ -202,12 +218,16 @@ def _fixed_step(
         if not np.all(good):
             when = time[first + int(np.argmin(good))]
             raise DivergenceError(f"flight is not finite after t = {when:.6g} s: try a step below {step:.3g} s")
-        blocks.append(states[:flown])
+        index = first + 1 + np.arange(flown)
+        wanted = (index % every == 0) | (index == lengths.size)
+        kept += index[wanted].tolist()
+        blocks.append(states[:flown][wanted])
         if flown < chosen.size:
             here = states[flown - 1] if flown else before
             length, last = _last_step(dynamics, here, parameters, chosen[flown], end)
-            return np.append(time[: first + flown + 1], time[first + flown] + length), np.vstack([*blocks, last])
-    return time, np.vstack(blocks)
+            return np.append(time[kept], time[first + flown] + length), np.vstack([*blocks, last])
+        before = states[-1]
+    return time[kept], np.vstack(blocks)
 
 
 def _step_lengths(duration: float, step: float) -> Array:
@@ -261,9 +281,9 @@ def _adaptive(
 
 def _difference(time: Array, states: Array, finer_time: Array, finer: Array) -> dict[str, float]:
     """Error of `states`: 16/15 of the difference from a flight of half the step, at the instants of both."""
-    n = min(len(time), (len(finer_time) + 1) // 2)
-    shared = np.isclose(time[:n], finer_time[: 2 * n : 2], rtol=1e-12, atol=0.0)
-    coarse, fine = states[:n][shared], finer[: 2 * n : 2][shared]
+    n = min(len(time), len(finer_time))
+    shared = np.isclose(time[:n], finer_time[:n], rtol=1e-12, atol=0.0)
+    coarse, fine = states[:n][shared], finer[:n][shared]
     position = np.max(np.linalg.norm(coarse[:, POSITION] - fine[:, POSITION], axis=1))
     a, b = (y[:, QUATERNION] / np.linalg.norm(y[:, QUATERNION], axis=1, keepdims=True) for y in (coarse, fine))
     attitude = np.max(4.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(a - b, axis=1), 0.0, 1.0)))
