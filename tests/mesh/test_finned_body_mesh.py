@@ -240,11 +240,11 @@ def test_shock_angle_is_close_above_the_taylor_maccoll_solution():
     rows = zip(*(table.numbers(n) for n in ("sigma_deg", "M", "shock_deg")), strict=True)
     checked = 0
     for sigma, mach, exact in rows:
-        if 1.5 <= mach <= 4.5 and 5.0 <= sigma <= 15.0:
+        if 1.5 <= mach <= 6.0 and 5.0 <= sigma <= 20.0:
             angle = np.degrees(shock_angle(mach, np.radians(sigma)))
-            assert exact - 0.1 < angle < exact + 3.0
+            assert 0.1 < angle - exact < 1.5
             checked += 1
-    assert checked > 5
+    assert checked > 20
 
 
 def test_presets_refine_by_a_constant_ratio():

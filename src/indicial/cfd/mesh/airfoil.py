@@ -8,7 +8,7 @@ with z_t the trailing edge of angle epsilon and z_n midway between the leading e
 opens the airfoil to a near-circle, without corners, in the w plane. There the mesh is polar about the near-circle's
 centre. The map is conformal: in the z plane the grid lines cross at right angles up to the slope of the
 near-circle's radius, a few degrees.
-Source: J. C. Vassberg and A. Jameson, J. Aircraft 47 (2010) 1152, section III.
+Used for such meshes by J. C. Vassberg and A. Jameson, J. Aircraft 47 (2010) 1152.
 """
 
 from __future__ import annotations

@@ -16,9 +16,9 @@ GAMMA = 1.4
 def shock_angle(mach: float, half_angle: float) -> float:
     r"""Angle [rad] of the attached shock of a cone of the given half angle [rad], a little on the large side.
 
-    ``sin^2 beta = (gamma + 1)/2 sin^2 theta_c + 1/M^2``, with gamma = 1.4: within about 1.5 degrees above the
-    Taylor-Maccoll solution for slender cones from M 1.5.
-    Source: M. L. Rasmussen, AIAA J. 5 (1967) 1495, Eq. 17.
+    ``sin^2 beta = (gamma + 1)/2 sin^2 theta_c + 1/M^2``, with gamma = 1.4: 0.2 to 1.4 degrees above the
+    Taylor-Maccoll solution for half angles of 5 to 20 degrees and M 1.5 to 6.
+    Source: M. L. Rasmussen, On hypersonic flow past an unyawed cone, AIAA J. 5 (1967) 1495.
 
     Raises
     ------

@@ -64,7 +64,7 @@ def finned_body_mesh(
     body : FinnedBody
         Single-wedge fins must end at the base.
     resolution : "quick", "coarse", "medium", "fine" or float
-        About 9,000, 31,000, 100,000 and 340,000 cells for half a Basic Finner; a number is the ratio of cells along
+        About 9,600, 32,000, 109,000 and 372,000 cells for half a Basic Finner; a number is the ratio of cells along
         every direction to those of "quick".
     mach : float
         Mach number [-], above 1 with an attached bow shock. The outflow plane asks for about 1.4 or more.

@@ -21,7 +21,7 @@ class Airfoil:
 
     Thickness ``y_t = 5 t (0.2969 sqrt(x) - 0.1260 x - 0.3516 x^2 + 0.2843 x^3 - b x^4)`` with b = 0.1015, or
     0.1036, which closes the trailing edge; laid off normal to the camber line (two parabolas).
-    Source: Abbott and von Doenhoff, Theory of Wing Sections, Dover 1959, section 6.4.
+    Source: Abbott and von Doenhoff, Theory of Wing Sections, Dover 1959, chapter 6 (for b = 0.1015).
 
     Parameters
     ----------
