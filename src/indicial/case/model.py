@@ -6,12 +6,15 @@ Every field has a description: the case-file page of the documentation is made f
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from indicial.conventions import ReferenceQuantities
 from indicial.motion import FlightCondition
+
+if TYPE_CHECKING:
+    from indicial.cfd.shapes import FinnedBody
 
 UNITS = {
     "deg": "degrees",
@@ -48,16 +51,22 @@ class Condition(Section):
 
 
 class Fins(Section):
-    """Equal fins in a ring, flat, rectangular or tapered."""
+    """Equal trapezoidal fins, evenly spread round the body, thickness in proportion to the local chord."""
 
-    count: Annotated[int, Field(ge=4, le=4, description="number of fins")] = 4
+    number: Annotated[int, Field(ge=1, le=16, description="number of fins")] = 4
     root_chord_calibres: Annotated[Positive, Field(description="chord at the body")]
     tip_chord_calibres: Annotated[Positive, Field(description="chord at the tip")]
     span_calibres: Annotated[Positive, Field(description="exposed span of one fin, from the body's surface")]
-    thickness_calibres: Annotated[
-        NotNegative, Field(description="thickness of the single-wedge section at its blunt trailing edge")
-    ]
-    trailing_edge_calibres: Annotated[Positive, Field(description="trailing edge, from the nose")]
+    trailing_edge_calibres: Annotated[Positive, Field(description="trailing edge of the root, from the nose")]
+    section: Annotated[
+        Literal["single_wedge", "double_wedge"],
+        Field(description="section: sharp in front and cut off at its thickest, or thickest at half chord"),
+    ] = "single_wedge"
+    thickness_ratio: Annotated[float, Field(gt=0.0, le=0.2, description="largest thickness over chord")]
+    leading_edge_sweep_deg: Annotated[float, Field(ge=0.0, lt=80.0, description="sweep of the leading edge")] = 0.0
+    roll_deg: Annotated[
+        float, Field(ge=0.0, lt=360.0, description="angle of the first fin from the right, upward: 45 is an x")
+    ] = 45.0
 
 
 class Shape(Section):
@@ -65,7 +74,7 @@ class Shape(Section):
 
     kind: Annotated[Literal["finned_body"], Field(description="kind of shape")]
     diameter_m: Annotated[Positive, Field(description="calibre d: the body's diameter and reference length")]
-    nose: Annotated[Literal["cone", "ogive"], Field(description="nose type")] = "cone"
+    nose: Annotated[Literal["cone", "tangent_ogive"], Field(description="nose type")] = "cone"
     nose_length_calibres: Annotated[Positive, Field(description="length of the nose")]
     length_calibres: Annotated[Positive, Field(description="length of the whole body")]
     fins: Annotated[Fins, Field(description="the fins")]
@@ -91,35 +100,39 @@ class Reference(Section):
 
 
 class Mesh(Section):
-    """Cells of the body-fitted mesh of the half model (the full model has twice as many round the body)."""
+    """The body-fitted mesh, of half the body, and of the whole one for roll."""
 
-    axial_cells: Annotated[int, Field(ge=20, le=2000, description="cells along the body")]
-    radial_cells: Annotated[int, Field(ge=8, le=500, description="cells from the body to the outer boundary")]
-    circumferential_cells: Annotated[
-        int, Field(ge=8, le=500, multiple_of=4, description="cells round half of the body")
+    resolution: Annotated[
+        float, Field(ge=0.5, le=8.0, description="cells along every direction relative to the quick mesh, which is 1")
     ]
+    margin: Annotated[
+        float, Field(ge=1.0, le=3.0, description="distance of the outer boundary, relative to the bow shock's")
+    ] = 1.15
 
 
 class Flow(Section):
     """The flow solver."""
 
     steady_tolerance: Annotated[
-        float, Field(gt=0.0, lt=1.0, description="drop of the residual at which a steady state is taken")
-    ] = 1e-6
-    step_tolerance: Annotated[
-        float, Field(gt=0.0, lt=1.0, description="drop of the residual in each implicit time step")
-    ] = 1e-2
+        float,
+        Field(gt=0.0, lt=1.0, description="residual of a steady state, relative to that of still air"),
+    ] = 1e-9
+    unsteady_tolerance: Annotated[
+        float,
+        Field(gt=0.0, lt=1.0, description="residual left by a time step, relative to what the motion does to it"),
+    ] = 2e-4
 
 
 class MovingFrame(Section):
-    """Steady states in the moving frame (MRF)."""
+    """Steady states in the moving frame (MRF), differences between opposite disturbances."""
 
-    alpha_amplitude_deg: Annotated[SmallAngle, Field(description="half step of the central difference in alpha")] = 0.25
-    second_alpha_amplitude_deg: Annotated[
-        SmallAngle, Field(description="another half step in alpha: shows that the answer is linear")
-    ] = 0.5
-    pitch_rate: Annotated[SmallRate, Field(description="half step in q c/2V")] = 0.0005
-    roll_rate: Annotated[SmallRate, Field(description="p c/2V of the rolling full model")] = 0.002
+    alpha_amplitude_deg: Annotated[SmallAngle, Field(description="half difference in alpha")] = 0.25
+    pitch_rate: Annotated[SmallRate, Field(description="half difference in q c/2V")] = 0.001
+    roll_rate: Annotated[SmallRate, Field(description="p c/2V of the whole model")] = 0.005
+    second_factor: Annotated[
+        float,
+        Field(gt=1.0, le=4.0, description="second amplitude of alpha and q, relative to the first: shows linearity"),
+    ] = 2.0
 
 
 class ForcedOscillation(Section):
@@ -128,10 +141,9 @@ class ForcedOscillation(Section):
     k: Annotated[float, Field(gt=0.0, le=2.0, description="reduced frequency omega c/2V")] = 0.1
     amplitude_deg: Annotated[SmallAngle, Field(description="amplitude in alpha")] = 0.25
     steps_per_period: Annotated[int, Field(ge=16, le=10000, multiple_of=2, description="time steps in a period")] = 48
-    periods: Annotated[int, Field(ge=1, le=50, description="whole periods that are reduced")] = 1
-    transient_periods: Annotated[
-        float, Field(ge=0.25, le=50.0, description="periods before them, left out (in quarters)", multiple_of=0.25)
-    ] = 0.5
+    periods: Annotated[
+        int, Field(ge=2, le=50, description="whole periods; the first is left to the start and not read")
+    ] = 2
 
 
 class IndicialResponse(Section):
@@ -199,6 +211,15 @@ class Range(Section):
     seed: Annotated[int, Field(ge=0, description="seed of the noise: the same seed, the same noise")] = 1
 
 
+class Comparison(Section):
+    """What the results are compared with."""
+
+    measured: Annotated[
+        Literal["none", "basic_finner_range"],
+        Field(description="measured derivatives: the Basic Finner's free flights (DREV-TM-9703), or none"),
+    ] = "none"
+
+
 class Run(Section):
     """How the work is done; nothing here changes a result."""
 
@@ -221,6 +242,7 @@ class Case(Section):
     vehicle: Annotated[Vehicle, Field(description="mass properties")]
     flight: Annotated[Flight, Field(description="free flight")] = Flight()
     range: Annotated[Range, Field(description="measurements of the flight")] = Range()
+    comparison: Annotated[Comparison, Field(description="measured data")] = Comparison()
     run: Annotated[Run, Field(description="how the work is done")] = Run()
 
     @model_validator(mode="after")
@@ -230,8 +252,6 @@ class Case(Section):
                 "condition.mach: is too low for a mesh that ends at the base, where all flow must leave supersonic; "
                 "allowed: at least 1.4"
             )
-        if self.moving_frame.alpha_amplitude_deg == self.moving_frame.second_alpha_amplitude_deg:
-            raise ValueError("moving_frame.second_alpha_amplitude_deg: equals the first; allowed: another amplitude")
         if not 0.0 < self.reference.moment_reference_calibres < self.shape.length_calibres:
             raise ValueError("reference.moment_reference_calibres: is off the body; allowed: 0 to length_calibres")
         return self
@@ -243,8 +263,26 @@ class Case(Section):
         return FlightCondition(c.mach, math.radians(c.alpha_deg), 0.0, c.temperature_K, c.pressure_Pa)
 
     @property
+    def body(self) -> FinnedBody:
+        """The shape."""
+        # the solver's package takes seconds to load; a case is read in far less
+        from indicial.cfd.shapes import FinnedBody, FinSet, Nose
+
+        s, f = self.shape, self.shape.fins
+        fins = FinSet(
+            number=f.number,
+            root_chord=f.root_chord_calibres,
+            tip_chord=f.tip_chord_calibres,
+            span=f.span_calibres,
+            trailing_edge=f.trailing_edge_calibres,
+            section=f.section,
+            thickness_ratio=f.thickness_ratio,
+            leading_edge_sweep_deg=f.leading_edge_sweep_deg,
+            roll_deg=f.roll_deg,
+        )
+        return FinnedBody(s.diameter_m, Nose(s.nose, s.nose_length_calibres), s.length_calibres, fins)
+
+    @property
     def reference_quantities(self) -> ReferenceQuantities:
         """Length d, area pi d^2/4, moment reference point; rates per c/2V."""
-        d = self.shape.diameter_m
-        x = self.reference.moment_reference_calibres * d
-        return ReferenceQuantities(d, math.pi * d * d / 4.0, (x, 0.0, 0.0))
+        return self.body.reference(self.reference.moment_reference_calibres)

@@ -1,0 +1,148 @@
+"""The commands: each stage by itself, and all of them in order."""
+
+from __future__ import annotations
+
+import enum
+from typing import Annotated
+
+import typer
+
+import indicial
+
+app = typer.Typer(
+    name="indicial",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",
+    help=(
+        "Unsteady aerodynamics for flight dynamics: from a shape to a flown, identified and checked dynamic model.\n\n"
+        "**Start here:** `indicial run data/cases/basic_finner_quick.toml`"
+    ),
+)
+
+Target = Annotated[
+    str, typer.Argument(metavar="CASE", help="A case file (on disk or packaged), or the folder of an earlier run.")
+]
+Output = Annotated[
+    str | None, typer.Option("--output", "-o", metavar="DIR", help="Run folder; `runs/NAME` of the case if not given.")
+]
+Workers = Annotated[
+    int | None, typer.Option("--workers", "-w", min=1, help="Processes that share the CFD; the case's if not given.")
+]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Log to the terminal what is being done.")]
+
+
+class Method(enum.StrEnum):
+    """Methods of `derive`."""
+
+    MRF = "mrf"
+    FOM = "fom"
+    IRM = "irm"
+    ALL = "all"
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"indicial {indicial.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop.")
+    ] = False,
+) -> None:
+    pass
+
+
+def _perform(
+    target: str, output: str | None, workers: int | None, verbose: bool, stages: tuple[str, ...], resume: bool
+) -> None:
+    import logging
+
+    from indicial.cli.console import ConsoleReporter
+    from indicial.pipeline import open_run, run_stages
+
+    if verbose:
+        logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s: %(message)s")
+    case, folder = open_run(target, output)
+    try:
+        with ConsoleReporter() as reporter:
+            run_stages(case, folder, stages, workers=workers, reporter=reporter, resume=resume)
+    except KeyboardInterrupt:
+        typer.echo(f"\ninterrupted; what is done is kept in {folder.path}: run the same command to resume", err=True)
+        raise typer.Exit(130) from None
+
+
+@app.command(
+    epilog="**Examples:** `indicial run data/cases/basic_finner_quick.toml`, "
+    "`indicial run my_missile.toml --output runs/second --workers 8`"
+)
+def run(case: Target, output: Output = None, workers: Workers = None, verbose: Verbose = False) -> None:
+    """Do everything: mesh, CFD by three methods, reduced-order model, flights, identification, comparison, report.
+
+    An interrupted run goes on where it was when the same command is given again.
+    """
+    from indicial.pipeline import ALL_STAGES, open_run
+
+    _perform(case, output, workers, verbose, ALL_STAGES, resume=True)
+    folder = open_run(case, output)[1]
+    typer.echo((folder.path / "comparison.txt").read_text(encoding="utf-8"))
+    typer.echo(f"report: {folder.path / 'report.html'}")
+
+
+@app.command(epilog="**Example:** `indicial mesh data/cases/basic_finner_quick.toml -o runs/finner`")
+def mesh(case: Target, output: Output = None, verbose: Verbose = False) -> None:
+    """Make and check the meshes of the half and the whole model."""
+    _perform(case, output, None, verbose, ("mesh",), resume=False)
+
+
+@app.command(epilog="**Example:** `indicial derive runs/finner --method mrf`")
+def derive(
+    case: Target,
+    method: Annotated[Method, typer.Option("--method", "-m", help="Which of the methods.")] = Method.ALL,
+    output: Output = None,
+    workers: Workers = None,
+    verbose: Verbose = False,
+) -> None:
+    """Dynamic derivatives from CFD: moving frame (mrf), forced oscillation (fom), indicial response (irm).
+
+    CFD results that are already in the run folder are used again.
+    """
+    stages = ("mrf", "fom", "irm") if method is Method.ALL else (method.value,)
+    _perform(case, output, workers, verbose, ("mesh", *stages), resume=True)
+
+
+@app.command(epilog="**Example:** `indicial rom runs/finner`")
+def rom(case: Target, output: Output = None, verbose: Verbose = False) -> None:
+    """A state-space model from the step responses, checked against the forced oscillations it has not seen."""
+    _perform(case, output, None, verbose, ("rom",), resume=False)
+
+
+@app.command(epilog="**Example:** `indicial fly runs/finner`")
+def fly(case: Target, output: Output = None, verbose: Verbose = False) -> None:
+    """Fly the model twice, with derivatives and with the reduced-order model in the loop; check the damping."""
+    _perform(case, output, None, verbose, ("fly",), resume=False)
+
+
+@app.command(epilog="**Example:** `indicial identify runs/finner`")
+def identify(case: Target, output: Output = None, verbose: Verbose = False) -> None:
+    """Measure the flight as a spark range does, with noise, and identify its derivatives."""
+    _perform(case, output, None, verbose, ("identify",), resume=False)
+
+
+@app.command(epilog="**Example:** `indicial compare runs/finner`")
+def compare(case: Target, output: Output = None, verbose: Verbose = False) -> None:
+    """Set every derivative by every method beside the measured ones: results.json and a table."""
+    from indicial.pipeline import open_run
+
+    _perform(case, output, None, verbose, ("compare",), resume=False)
+    typer.echo((open_run(case, output)[1].path / "comparison.txt").read_text(encoding="utf-8"))
+
+
+@app.command(epilog="**Example:** `indicial report runs/finner`")
+def report(case: Target, output: Output = None, verbose: Verbose = False) -> None:
+    """Draw the figures and write the HTML report, one file that needs nothing else."""
+    _perform(case, output, None, verbose, ("report",), resume=False)

@@ -1,0 +1,125 @@
+"""The rom stage: models of the step responses, and what they say of oscillations they have not seen."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from indicial.conventions import Array
+from indicial.errors import NoLimitError
+from indicial.history import History
+from indicial.pipeline.context import Context, Outcome
+from indicial.rom import (
+    ConvolutionModel,
+    PredictionCheck,
+    QuasiSteadyModel,
+    ReducedModel,
+    StateSpaceModel,
+    StepResponses,
+    check_prediction,
+    realise,
+)
+
+STEPS = ("alpha_up", "alpha_down", "q")
+MOTIONS = ("pitch", "plunge")
+
+
+def reduce(context: Context) -> Outcome:
+    """Make the models, keep them, and check them against the forced oscillations."""
+    folder = context.folder
+    irm = folder.read("irm")
+    fom = folder.read("fom")
+    steps = [History.from_netcdf(folder.histories / f"irm_{name}.nc") for name in STEPS]
+    responses = _with_finals(StepResponses.from_histories(steps), irm["finals"])
+    responses.to_netcdf(folder.path / "rom" / "step_responses.nc")
+    context.reporter.update(0.2, "state-space realisation")
+    model = realise(responses, max_order=context.case.rom.order)
+    model.to_json(folder.path / "rom" / "model.json")
+    model.to_netcdf(folder.path / "rom" / "model.nc")
+    context.reporter.update(0.8, "prediction checks")
+    models: dict[str, ReducedModel] = {"convolution, Eq. 13": ConvolutionModel(responses), "state space": model}
+    refused = ""
+    try:
+        models["deficiency, Eq. 16"] = QuasiSteadyModel.from_responses(responses)
+    except NoLimitError as error:
+        refused = str(error)
+    checks = []
+    for motion in MOTIONS:
+        history = History.from_netcdf(folder.histories / f"fom_{motion}.nc")
+        checks += [_checked(motion, name, _check(one, history)) for name, one in models.items()]
+    results = {
+        "derivatives": model.derivatives().to_records(),
+        "order": model.order,
+        "poles": [[pole.real, pole.imag] for pole in model.poles.tolist()],
+        "realised_by": model.method,
+        "fit": [{"output": e.output, "input": e.input, "rms": e.rms, "peak": e.peak} for e in model.errors],
+        "checks": checks,
+        "refused": refused,
+        "out_of_phase_at_k": _out_of_phase(model, fom, context.case.forced_oscillation.k),
+    }
+    worst = max(check["worst"] for check in checks if check["model"] == "state space")
+    return Outcome(results, f"order {model.order}; predicts unseen oscillations to {worst:.1%} of the unsteady load")
+
+
+def load_model(context: Context) -> StateSpaceModel:
+    """The state-space model that the stage kept."""
+    context.folder.read("rom")
+    return StateSpaceModel.from_json(context.folder.path / "rom" / "model.json")
+
+
+def predictions(context: Context) -> dict[str, tuple[History, dict[str, Array]]]:
+    """For the report: every checked history, and the coefficients that each model predicts, shape (n, 6)."""
+    folder = context.folder
+    responses = StepResponses.from_netcdf(folder.path / "rom" / "step_responses.nc")
+    models: dict[str, ReducedModel] = {"convolution": ConvolutionModel(responses), "state space": load_model(context)}
+    found = {}
+    for motion in MOTIONS:
+        history = History.from_netcdf(folder.histories / f"fom_{motion}.nc")
+        found[motion] = (history, {name: model.predict(history).coefficients for name, model in models.items()})
+    return found
+
+
+def _with_finals(responses: StepResponses, finals: dict[str, dict[str, float]]) -> StepResponses:
+    """The responses with the settled values that steady solutions gave."""
+    known = [
+        replace(response, final=np.array([finals[response.input][output] for output in responses.outputs]))
+        for response in responses.responses
+    ]
+    return replace(responses, responses=tuple(known))
+
+
+def _check(model: ReducedModel, history: History) -> PredictionCheck:
+    period = 2.0 * math.pi / float(history.motion["omega"])
+    last = history.s[-1] * (1.0 - period / history.time[-1])
+    return check_prediction(model, history, since=last * (1.0 - 1e-9))
+
+
+def _checked(motion: str, name: str, check: PredictionCheck) -> dict[str, Any]:
+    return {
+        "motion": motion,
+        "model": name,
+        "worst": check.worst,
+        "coefficients": {
+            c.name: {
+                "relative_rms": c.relative_rms,
+                "relative_peak": c.relative_peak,
+                "damping_cfd": c.damping_measured,
+                "damping_predicted": c.damping_predicted,
+            }
+            for c in check.coefficients
+        },
+    }
+
+
+def _out_of_phase(model: StateSpaceModel, fom: dict[str, Any], k: float) -> dict[str, dict[str, float]]:
+    """``Im(H_a(ik) + ik H_q(ik))/k`` of the model beside what the pitching oscillation gave."""
+    response = model.frequency_response([k])[0]
+    alpha, q = model.inputs.index("alpha"), model.inputs.index("q")
+    at_k = np.imag(response[:, alpha] + 1j * k * response[:, q]) / k
+    return {
+        output: {"rom": float(at_k[i]), "fom": float(fom["ellipses"]["pitch"][output][1])}
+        for i, output in enumerate(model.outputs)
+    }

@@ -1,0 +1,249 @@
+"""The report stage: figures and one HTML file, from what the other stages left."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from indicial.cfd.mesh import Mesh
+from indicial.derivatives import DerivativeTable
+from indicial.history import History
+from indicial.pipeline.context import Context, Outcome
+from indicial.pipeline.flying import load_flights
+from indicial.pipeline.reducing import STEPS, predictions
+from indicial.report.comparison import COLUMNS, ComparisonRow, comparison, comparison_figure
+from indicial.report.flight import LABELS, angle_figure, damping_figure, difference_figure, flight_figure
+from indicial.report.html import Chapter, Grid, Picture, write_html
+from indicial.report.loads import convergence_figure, loop_figure, prediction_figure, step_figure
+from indicial.report.space import FlowPicture, flow_figure, mesh_figure
+from indicial.report.style import METHOD_NAMES, save
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def write_report(context: Context) -> Outcome:
+    """Draw every figure, and write ``report.html``."""
+    folder = context.folder
+    results = json.loads((folder.path / "results.json").read_text(encoding="utf-8"))
+    rows = comparison(DerivativeTable.from_records(results["derivatives"]))
+    makers = [_comparison, _mesh_and_flow, _moving_frame, _oscillations, _steps, _models, _flights]
+    chapters = []
+    for done, maker in enumerate(makers):
+        chapter = maker(context, results, rows)
+        context.reporter.update((done + 1) / len(makers), chapter.title)
+        chapters.append(chapter)
+    lead = [results["statement"], *_lead(results)]
+    facts = {**results["versions"], "CFD": f"{results['timings_s']['irm']:.0f} s"}
+    write_html(folder.path / "report.html", results["title"], lead, chapters, facts)
+    return Outcome({}, str(folder.path / "report.html"))
+
+
+def _lead(results: dict[str, Any]) -> Iterator[str]:
+    arm = results["damping"]["derivatives"]["arms"][0]
+    other = results["damping"]["rom"]["arms"][0]
+    change = other["linearised_1_s"] / arm["linearised_1_s"] - 1.0
+    yield (
+        f"In flight the angular motion dies out at {-arm['linearised_1_s']:.3g} 1/s with the derivative model; with "
+        f"the state-space model in the loop that changes by {change:+.2%}."
+    )
+    checks = [check for check in results["rom"]["checks"] if check["model"] == "state space"]
+    worst = max(check["worst"] for check in checks)
+    yield (
+        f"The state-space model of order {results['rom']['order']} predicts forced oscillations that it has not seen "
+        f"to within {worst:.1%} (rms) of their unsteady load."
+    )
+
+
+def _picture(context: Context, name: str, make: Callable[[], Figure], caption: str) -> Picture:
+    return Picture(save(make(), context.folder.figures / f"{name}.png"), caption)
+
+
+def _comparison(context: Context, results: dict[str, Any], rows: list[ComparisonRow]) -> Chapter:
+    headings = ["derivative", *(METHOD_NAMES[method] for method in COLUMNS)]
+    cells = [[row.name, *(_cell(row, method) for method in COLUMNS)] for row in rows]
+    agreement = [
+        [a["what"], a["name"], f"{a['first']:.5g}", f"{a['second']:.5g}", f"{a['difference']:+.2%}"]
+        for a in results["agreement"]
+    ]
+    chapter_rows = [row for row in rows if not (row.measured and row.measured.value == 0.0)]
+    return Chapter(
+        "Comparison",
+        [
+            "Per radian; rates made dimensionless as q d/2V. The number after ± is one standard error; what follows in "
+            "brackets is the difference from the measured value.",
+            f"Measured data: {results['measured_data']}",
+        ],
+        [
+            Grid(headings, cells, "Every derivative by every method"),
+            Grid(
+                ["what theory says must agree", "derivative", "first", "second", "difference"],
+                agreement,
+                "Agreement of the methods; differences relative to the damping sum (slopes: to themselves)",
+            ),
+            _linearity(results),
+        ],
+        [
+            _picture(
+                context,
+                "comparison",
+                lambda: comparison_figure(chapter_rows),
+                "Every value relative to the measured one, with standard errors.",
+            )
+        ],
+    )
+
+
+def _linearity(results: dict[str, Any]) -> Grid:
+    rows = [[e["name"], e["method"].upper(), e["what"], f"{e['change']:.2e}"] for e in results["linearity"]]
+    return Grid(["derivative", "method", "checked against", "relative change"], rows, "Is the answer linear?")
+
+
+def _cell(row: ComparisonRow, method: str) -> str:
+    record = row.records.get(method)
+    if record is None:
+        return "–"
+    text = f"{record.value:.4g}"
+    if record.uncertainty is not None:
+        text += f" ± {record.uncertainty:.2g}"
+    deviation = row.deviation(method)
+    return text if deviation is None or method == "measured" else f"{text} ({deviation:+.0%})"
+
+
+def _mesh_and_flow(context: Context, results: dict[str, Any], rows: list[ComparisonRow]) -> Chapter:
+    folder, d = context.folder, context.case.shape.diameter_m
+    mesh = Mesh.load(folder.mesh(whole=False))
+    pictures = [
+        _picture(
+            context, "mesh", lambda: mesh_figure(mesh, d), "The mesh of half the body; the fins are surfaces in it."
+        )
+    ]
+    flow = folder.path / "flow.npz"
+    if flow.is_file():
+        shown = FlowPicture.load(flow)
+        caption = "Steady flow: Mach number in the symmetry plane, pressure on the surface."
+        pictures.append(_picture(context, "flow", lambda: flow_figure(shown, d), caption))
+    facts = [
+        [name, f"{part['n_cells']:,}", f"{part['closure']:.1e}", f"{part['non_orthogonality_deg']:.0f}"]
+        for name, part in results["mesh"].items()
+    ]
+    grid = Grid(["model", "cells", "closure of cells", "largest non-orthogonality [deg]"], facts)
+    return Chapter("Mesh and flow", [context.case.body.summary()], [grid], pictures)
+
+
+def _moving_frame(context: Context, results: dict[str, Any], rows: list[ComparisonRow]) -> Chapter:
+    residuals = dict(_residuals(context))
+    text = [
+        "Derivatives are differences of steady solutions in axes that move with the body, at constant angle of attack "
+        "and constant rate."
+    ]
+    if not residuals:
+        return Chapter("Moving frame", text)
+    caption = "How the steady states converged; all but the first start from a nearby one."
+    return Chapter(
+        "Moving frame",
+        text,
+        (),
+        [_picture(context, "convergence", lambda: convergence_figure(residuals), caption)],
+    )
+
+
+def _residuals(context: Context) -> Iterator[tuple[str, np.ndarray]]:
+    for file in sorted(context.folder.experiments.glob("*.json")):
+        content = json.loads(file.read_text(encoding="utf-8"))
+        if "residuals" in content:
+            yield content["experiment"], np.array(content["residuals"])
+
+
+def _oscillations(context: Context, results: dict[str, Any], rows: list[ComparisonRow]) -> Chapter:
+    fom = context.folder.read("fom")
+    loops = {
+        f"{motion}ing": History.from_netcdf(context.folder.histories / f"fom_{motion}.nc")
+        for motion in ("pitch", "plunge")
+    }
+    loops = {title.replace("plungeing", "plunging"): history for title, history in loops.items()}
+    ellipses = dict(zip(loops, (fom["ellipses"]["pitch"], fom["ellipses"]["plunge"]), strict=True))
+    table = DerivativeTable.from_records(fom["derivatives"])
+    by_reduction = [
+        [name, *(f"{table.value(name, reduction=r):.6g}" for r in ("phase_angle", "regression", "fourier"))]
+        for name in table.names()
+    ]
+    grid = Grid(["derivative", "phase angle (6)", "regression (9)", "Fourier (12)"], by_reduction, "Three reductions")
+    caption = (
+        "Normal force and pitching moment against the angle of the motion. Dots: the period that is read; line: its "
+        "first harmonic, whose width is the damping."
+    )
+    picture = _picture(context, "loops", lambda: loop_figure(loops, ellipses), caption)
+    return Chapter("Forced oscillation", (), [grid], [picture])
+
+
+def _steps(context: Context, results: dict[str, Any], rows: list[ComparisonRow]) -> Chapter:
+    histories = {name: History.from_netcdf(context.folder.histories / f"irm_{name}.nc") for name in STEPS}
+    steps = {"alpha": [histories["alpha_up"], histories["alpha_down"]], "q": [histories["q"]]}
+    irm = context.folder.read("irm")
+    tails = [f"{name}: {reason}" for name, reason in irm["tails"].items()]
+    refused = [f"Refused: {name}, {reason}" for name, reason in irm["refused"].items()]
+    caption = (
+        "Responses to steps. The dot is the first instant (piston theory); the shaded area is the deficiency (Eq. 17)."
+    )
+    picture = _picture(context, "steps", lambda: step_figure(steps), caption)
+    return Chapter("Indicial response", [*tails, *refused], (), [picture])
+
+
+def _models(context: Context, results: dict[str, Any], rows: list[ComparisonRow]) -> Chapter:
+    cells = [
+        [
+            f"{check['motion']}, {check['model']}",
+            *(
+                f"{check['coefficients'][name][part]:.2%}"
+                for name in ("CN", "Cm")
+                for part in ("relative_rms", "relative_peak")
+            ),
+        ]
+        for check in results["rom"]["checks"]
+    ]
+    grid = Grid(
+        ["oscillation, model", "CN rms", "CN peak", "Cm rms", "Cm peak"],
+        cells,
+        "Error of the predicted load in the last period, relative to its unsteady part",
+    )
+    poles = ", ".join(f"{re:.3g}{f' ± {im:.3g}i' if im else ''}" for re, im in results["rom"]["poles"] if im >= 0.0)
+    text = [f"State-space model of order {results['rom']['order']} ({results['rom']['realised_by']}); poles {poles}."]
+    if results["rom"]["refused"]:
+        text.append(results["rom"]["refused"])
+    caption = "CFD oscillations that the models have not seen, and what the models predict of them."
+    picture = _picture(context, "predictions", lambda: prediction_figure(predictions(context)), caption)
+    return Chapter("Reduced-order model", text, [grid], [picture])
+
+
+def _flights(context: Context, results: dict[str, Any], rows: list[ComparisonRow]) -> Chapter:
+    flights = load_flights(context)
+    damping = results["damping"]
+    cells = [
+        [
+            f"{LABELS[name]}, {arm['name']}",
+            *(f"{arm[key]:.4g}" for key in ("linearised_1_s", "fitted_1_s", "closed_form_1_s", "turning_rad_s")),
+        ]
+        for name, record in damping.items()
+        for arm in record["arms"]
+    ]
+    grid = Grid(
+        ["model, arm", "linearised [1/s]", "fitted to the flight [1/s]", "closed form [1/s]", "turning [rad/s]"],
+        cells,
+        "Damping of the angular motion",
+    )
+    pictures = [
+        _picture(context, "flight", lambda: flight_figure(flights), "The same flight with both models."),
+        _picture(
+            context,
+            "flight_difference",
+            lambda: difference_figure(flights),
+            "What the unsteady model changes, at the same place along the range.",
+        ),
+        _picture(context, "angles", lambda: angle_figure(flights), "Angular motion."),
+        _picture(context, "damping", lambda: damping_figure(damping), "Damping, three ways."),
+    ]
+    return Chapter("Flight", [results["flight"]["comparison"]["summary"]], [grid], pictures)
