@@ -65,7 +65,7 @@ def test_keeping_every_tenth_step_changes_no_number() -> None:
 
 def test_fast_lags_take_short_steps_but_keep_few_instants() -> None:
     lagged, quasi = (simulate(FINNER, model, START, 0.05) for model in (first_order_lag(0.5), derivative_model()))
-    assert lagged.provenance["step_s"] < 0.02 * quasi.provenance["step_s"]
+    assert lagged.provenance["step_s"] < 0.1 * quasi.provenance["step_s"]
     assert len(lagged) < 2 * len(quasi)
 
 

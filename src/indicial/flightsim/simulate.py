@@ -149,13 +149,15 @@ def fly(
 def suggest_step(dynamics: Dynamics, state: Array, parameters: Array, duration: float) -> tuple[float, int]:
     """Step [s] and every how many of them to keep.
 
-    The step is a tenth of the time constant of the fastest eigenvalue at `state`, at most a tenth of the flight; the
-    instants kept are a tenth of the time constant of the rigid body apart (its lag states held), or closer.
+    The step is at most a tenth of the flight, a tenth of the time constant of the rigid body (its lag states held)
+    at `state`, and half of that of the fastest eigenvalue, a lag that follows the motion: five times inside the
+    stability limit. The instants kept are a tenth of the rigid body's time constant apart, or closer.
     """
     jacobian = np.array(dynamics.derivative.jacobian()(state, parameters, 0)[0])
     fastest, rigid = (float(np.max(np.abs(np.linalg.eigvals(m)))) for m in (jacobian[3:, 3:], jacobian[3:13, 3:13]))
-    steps, instants = (math.ceil(max(10.0, duration * rate / 0.1)) for rate in (fastest, rigid))
-    return duration / steps, max(1, steps // instants)
+    instants = math.ceil(max(10.0, duration * rigid / 0.1))
+    steps = max(instants, math.ceil(duration * fastest / 0.5))
+    return duration / steps, steps // instants
 
 
 def record(dynamics: Dynamics, time: Array, states: Array, parameters: Array, provenance: dict[str, Any]) -> Trajectory:
