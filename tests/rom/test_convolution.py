@@ -89,7 +89,9 @@ def test_sampled_response_converges(interpolation: str, least: float) -> None:
 def test_frequency_response_equals_brute_force_quadrature(k: float, interpolation: str) -> None:
     data = responses(known_system(), CONDITION, graded(30.0, 25))
     model = ConvolutionModel(data, interpolation)  # type: ignore[arg-type]
-    fine = np.unique(np.concatenate([np.linspace(a, b, 801) for a, b in zip(data["q"].s[:-1], data["q"].s[1:])]))
+    fine = np.unique(
+        np.concatenate([np.linspace(a, b, 801) for a, b in zip(data["q"].s[:-1], data["q"].s[1:], strict=True)])
+    )
     f = data["q"].curve(interpolation)(fine)[:, 1]  # type: ignore[arg-type]
     exact = data.final[1, 1] - 1j * k * np.trapezoid(f * np.exp(-1j * k * fine), fine)
     assert model.frequency_response([k])[0, 1, 1] == pytest.approx(exact, abs=2e-5 * abs(exact))

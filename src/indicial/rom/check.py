@@ -13,6 +13,7 @@ from indicial.conventions import Array
 from indicial.errors import InputError
 from indicial.history import History
 from indicial.rom.model import ReducedModel
+from indicial.rom.signals import quadrature_weights
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -156,7 +157,7 @@ def check_prediction(
     if np.count_nonzero(used) < 3:
         raise InputError(f"fewer than three samples at or after s = {since:g}")
     predicted = model.predict(measured, neglect=neglect)
-    weights = np.gradient(measured.s[used])
+    weights = quadrature_weights(measured.s[used])
     weights /= np.sum(weights)
     checked = []
     for name in model.outputs:
@@ -192,7 +193,7 @@ def _out_of_phase(history: History, name: str, used: NDArray[np.bool_]) -> float
     sizes = np.array([np.ptp(theta), np.ptp(slope)])
     if np.any(sizes <= 1e-12):
         return None
-    root = np.sqrt(np.gradient(history.s[used]))
+    root = np.sqrt(quadrature_weights(history.s[used]))
     columns = np.stack([np.ones_like(theta), (theta - theta.mean()) / sizes[0], slope / sizes[1]], axis=1)
     fit, _, rank, _ = np.linalg.lstsq(root[:, None] * columns, root * history[name][used], rcond=1e-9)
     return float(fit[2] / sizes[1]) if rank == 3 else None

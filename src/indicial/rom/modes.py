@@ -169,15 +169,15 @@ class Target:
     weights: Array
     scale: Array
 
-    def residual(self, modes: Modes, amplitudes: Array) -> Array:
-        """Weighted, scaled misfit, shape (n, n_outputs); its squared sum is the squared error."""
-        misfit = modes.basis(self.s) @ amplitudes - self.values
+    def residual(self, basis: Array, amplitudes: Array) -> Array:
+        """Weighted, scaled misfit of a basis (n, order), shape (n, n_outputs); its squared sum is the squared error."""
+        misfit = basis @ amplitudes - self.values
         scaled: Array = misfit * np.sqrt(self.weights)[:, None] / (self.scale * np.sqrt(self.scale.size))
         return scaled
 
     def error(self, modes: Modes, amplitudes: Array) -> float:
         """Root-mean-square error relative to `scale`, over all outputs."""
-        return float(np.linalg.norm(self.residual(modes, amplitudes)))
+        return float(np.linalg.norm(self.residual(modes.basis(self.s), amplitudes)))
 
 
 @dataclass(frozen=True)
@@ -185,6 +185,7 @@ class _Fit:
     """The linear problem at given modes: amplitudes, and what its derivative needs."""
 
     amplitudes: Array
+    basis: Array  # at the samples, (n, order)
     constraint_inverse: Array  # right inverse of the constraints, (order, n_constraints)
     range: Array  # orthonormal range of what the data may choose, (n, n_free)
 
@@ -200,12 +201,13 @@ def _solve(modes: Modes, target: Target) -> _Fit:
     inverse = q[:, :rank] @ np.linalg.inv(r[:rank].T)
     particular, free = inverse @ np.array(values), q[:, rank:]
     root = np.sqrt(target.weights)[:, None]
-    basis = root * modes.basis(target.s)
-    left, singular, right = np.linalg.svd(basis @ free, full_matrices=False)
+    basis = modes.basis(target.s)
+    weighted = root * basis
+    left, singular, right = np.linalg.svd(weighted @ free, full_matrices=False)
     kept = singular > 1e-13 * np.max(singular, initial=0.0)
     left, singular, right = left[:, kept], singular[kept], right[kept]
-    chosen = right.T @ ((left.T @ (root * target.values - basis @ particular)) / singular[:, None])
-    return _Fit(particular + free @ chosen, inverse, left)
+    chosen = right.T @ ((left.T @ (root * target.values - weighted @ particular)) / singular[:, None])
+    return _Fit(particular + free @ chosen, basis, inverse, left)
 
 
 def fit_amplitudes(modes: Modes, target: Target) -> Array:
@@ -221,7 +223,7 @@ def _gradient(modes: Modes, fit: _Fit, target: Target) -> Array:
     basis, area = modes.slopes(target.s, target.horizon)
     direct = basis @ fit.amplitudes
     if fit.constraint_inverse.shape[1] > 1:
-        followed = modes.basis(target.s) @ fit.constraint_inverse[:, 1]
+        followed = fit.basis @ fit.constraint_inverse[:, 1]
         direct -= followed[:, None] * (area @ fit.amplitudes)[:, None, :]
     direct *= np.sqrt(target.weights)[:, None]
     direct -= fit.range @ (fit.range.T @ direct)
@@ -243,7 +245,7 @@ def clipped(modes: Modes, s: Array) -> Modes:
     return Modes(rates, np.clip(modes.pairs, 1.01 * low, 0.99 * high))
 
 
-def refine(start: Modes, target: Target, tolerance: float = 1e-6) -> Modes:
+def refine(start: Modes, target: Target, tolerance: float = 1e-6, evaluations: int = 60) -> Modes:
     """Poles of least error near `start`, by variable projection.
 
     Parameters
@@ -252,6 +254,8 @@ def refine(start: Modes, target: Target, tolerance: float = 1e-6) -> Modes:
     target : Target
     tolerance : float
         Relative change of the error, and of the poles, at which the search ends.
+    evaluations : int
+        Most evaluations of the misfit.
     """
 
     latest: dict[bytes, _Fit] = {}  # the gradient is asked for where the misfit was
@@ -260,7 +264,7 @@ def refine(start: Modes, target: Target, tolerance: float = 1e-6) -> Modes:
         modes = start.from_vector(vector)
         latest.clear()
         fit = latest[vector.tobytes()] = _solve(modes, target)
-        return target.residual(modes, fit.amplitudes).ravel()
+        return target.residual(fit.basis, fit.amplitudes).ravel()
 
     def gradient(vector: Array) -> Array:
         modes = start.from_vector(vector)
@@ -268,6 +272,6 @@ def refine(start: Modes, target: Target, tolerance: float = 1e-6) -> Modes:
 
     first = clipped(start, target.s)
     bounds = first.bounds(*rate_bounds(target.s))
-    options = {"xtol": tolerance, "ftol": tolerance, "gtol": 1e-15, "max_nfev": 60}
+    options = {"xtol": tolerance, "ftol": tolerance, "gtol": 1e-15, "max_nfev": evaluations}
     found = least_squares(misfit, first.to_vector(), gradient, bounds=bounds, **options)
     return start.from_vector(found.x)

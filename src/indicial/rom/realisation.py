@@ -26,12 +26,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.linalg import block_diag
+from threadpoolctl import threadpool_limits
 
 from indicial.conventions import Array
 from indicial.errors import InputError
 from indicial.rom.era import era_modes, settling_time
 from indicial.rom.modes import Modes, Target, clipped, fit_amplitudes, refine
 from indicial.rom.response import StepResponse, StepResponses
+from indicial.rom.signals import quadrature_weights
 from indicial.rom.state_space import Candidate, ChannelError, StateSpaceModel
 
 Method = Literal["auto", "exponential", "era", "modal"]
@@ -39,6 +41,7 @@ METHODS = ("exponential", "era", "modal")
 
 _WORST_CANCELLATION = 1e4  # amplitudes may exceed the deficiency function by this, no more
 _RESAMPLED = 240
+_RACE = 15  # evaluations after which the two best starts are chosen
 _QUASI_STEADY = 1e-3
 
 
@@ -94,10 +97,11 @@ def realise(
     orders = range(1, max_order + 1) if order is None else range(order, order + 1)
     blocks, candidates = [], []
     for response in responses.responses:
-        trials = _trials(response, methods, orders, tolerance, match_integral)
-        best = _choose(trials, tolerance)
+        with threadpool_limits(limits=1, user_api="blas"):  # small matrices: threads would only fight
+            trials = _trials(response, methods, orders, tolerance, match_integral)
+            best = _choose(trials, tolerance)
+            blocks.append(_fit_all(response, best, match_integral))
         candidates += [replace(t.candidate, chosen=t is best) for t in trials]
-        blocks.append(_fit_all(response, best, match_integral))
     model = StateSpaceModel(
         a=block_diag(*(block[0] for block in blocks)),
         b=block_diag(*(block[1] for block in blocks)),
@@ -120,7 +124,7 @@ def channel_errors(model: StateSpaceModel, responses: StepResponses) -> tuple[Ch
     errors = []
     for response in responses.responses:
         misfit = model.step(response.s)[response.input].values - response.values
-        weights, scale = _weights(response.s), _scale(response)
+        weights, scale = quadrature_weights(response.s), _scale(response)
         rms = np.sqrt(weights @ misfit**2) / scale
         peak = np.max(np.abs(misfit), axis=0) / _peak(response)
         errors += [
@@ -128,13 +132,6 @@ def channel_errors(model: StateSpaceModel, responses: StepResponses) -> tuple[Ch
             for i, output in enumerate(responses.outputs)
         ]
     return tuple(errors)
-
-
-def _weights(s: Array) -> Array:
-    """Trapezoidal quadrature weights."""
-    half = 0.5 * np.diff(s)
-    weights: Array = np.append(half, 0.0) + np.append(0.0, half)
-    return weights
 
 
 def _peak(response: StepResponse) -> Array:
@@ -145,7 +142,7 @@ def _peak(response: StepResponse) -> Array:
 
 def _scale(response: StepResponse) -> Array:
     """Norm of each deficiency function, or of 0.1% of the response where that is larger (a quasi-steady output)."""
-    weights = _weights(response.s)
+    weights = quadrature_weights(response.s)
     norm = np.sqrt(weights @ response.deficiency**2)
     return np.asarray(np.maximum(norm, _QUASI_STEADY * _peak(response) * np.sqrt(response.s[-1])))
 
@@ -160,7 +157,7 @@ def _target(response: StepResponse, keep: NDArray[np.intp], match_integral: bool
         initial=response.deficiency[0],
         integral=np.asarray(curve.integrate(0.0, response.s[-1])) if match_integral else None,
         horizon=horizon,
-        weights=_weights(response.s[keep]),
+        weights=quadrature_weights(response.s[keep]),
         scale=_scale(response),
     )
 
@@ -175,32 +172,41 @@ def _trials(
     held = np.setdiff1d(index, train)
     fitted = _target(response, train, match_integral)
     unseen = replace(fitted, s=response.s[held], values=response.deficiency[held])
-    unseen = replace(unseen, weights=_weights(response.s)[held] * response.s[-1] / np.sum(_weights(response.s)[held]))
+    unseen = replace(
+        unseen,
+        weights=quadrature_weights(response.s)[held] * response.s[-1] / np.sum(quadrature_weights(response.s)[held]),
+    )
     trials = []
     for method in methods:
         found: Modes | None = None
         errors: list[float] = []
         for order in orders:
-            best: tuple[float, Modes] | None = None
-            for start in _starts(method, order, fitted, found):
-                modes = clipped(start, fitted.s) if method == "era" else refine(start, fitted)
-                amplitudes = fit_amplitudes(modes, fitted)
-                if np.any(np.max(np.abs(amplitudes), axis=0) > _WORST_CANCELLATION * _peak(response)):
-                    continue
-                error = fitted.error(modes, amplitudes)
-                if best is None or error < best[0]:
-                    best = (error, modes)
-            if best is None:
+            modes = _best_modes(method, order, fitted, found)
+            amplitudes = fit_amplitudes(modes, fitted)
+            if np.any(np.max(np.abs(amplitudes), axis=0) > _WORST_CANCELLATION * _peak(response)):
                 continue
-            found = best[1]
-            errors.append(unseen.error(found, fit_amplitudes(found, fitted)))
-            trials.append(_Trial(found, Candidate(response.input, method, found.order, errors[-1])))
+            found = modes
+            errors.append(unseen.error(modes, amplitudes))
+            trials.append(_Trial(modes, Candidate(response.input, method, modes.order, errors[-1])))
             stalled = len(errors) > 3 and min(errors[-2:]) > 0.95 * min(errors[:-2])
             if errors[-1] < tolerance or stalled:
                 break
     if not trials:
         raise InputError(f"no well-posed realisation of the response to {response.input}; try another order or method")
     return trials
+
+
+def _best_modes(method: str, order: int, target: Target, smaller: Modes | None) -> Modes:
+    """Modes of least error: of all starts the two best after a few steps, refined to the end."""
+
+    def error(modes: Modes) -> float:
+        return target.error(modes, fit_amplitudes(modes, target))
+
+    starts = [clipped(start, target.s) for start in _starts(method, order, target, smaller)]
+    if method == "era":
+        return min(starts, key=error)
+    race = sorted((refine(start, target, evaluations=_RACE) for start in starts), key=error)
+    return min((refine(modes, target) for modes in race[:2]), key=error)
 
 
 def _starts(method: str, order: int, target: Target, smaller: Modes | None) -> list[Modes]:

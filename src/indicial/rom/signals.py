@@ -153,3 +153,10 @@ def check_names(names: tuple[str, ...], allowed: tuple[str, ...], what: str) -> 
     unknown: list[Any] = [name for name in names if name not in allowed]
     if unknown or not names or len(set(names)) != len(names):
         raise InputError(f"{what} are {names}, must be distinct ones of {', '.join(allowed)}")
+
+
+def quadrature_weights(s: Array) -> Array:
+    """Trapezoidal quadrature weights of samples at s, shape (n,), n >= 2."""
+    half = 0.5 * np.diff(s)
+    weights: Array = np.append(half, 0.0) + np.append(0.0, half)
+    return weights
