@@ -27,19 +27,19 @@ _H = 1e-40
 def _linearise_side(q, g, c, other, k, rx, ry, rz, dx, dy, dz, eps, out):  # type: ignore[no-untyped-def]
     """Value of variable k at the face and its slopes: own cell, other cell, dg.r, dg.d."""
     b = q[other, k] - q[c, k]
-    a = 2.0 * (g[c, k, 0] * dx + g[c, k, 1] * dy + g[c, k, 2] * dz) - b
-    psi, psi_a, psi_b = limiter(a, b, eps)
-    gr = g[c, k, 0] * rx + g[c, k, 1] * ry + g[c, k, 2] * rz
-    x = psi * gr
-    along = gr * (psi_b - psi_a)
+    gd = g[c, k, 0] * dx + g[c, k, 1] * dy + g[c, k, 2] * dz
+    psi, psi_a, psi_b = limiter(2.0 * gd - b, b, eps)
+    t = (rx * dx + ry * dy + rz * dz) / (dx * dx + dy * dy + dz * dz)
+    x = g[c, k, 0] * rx + g[c, k, 1] * ry + g[c, k, 2] * rz - (1.0 - psi) * t * gd
+    along = t * gd * (psi_b - psi_a)
     slope = 1.0
     own = 0.0
     if k == 0 or k == 4:
         x, slope, own = saturate(x, q[c, k])
     out[0] = 1.0 + own - slope * along
     out[1] = slope * along
-    out[2] = slope * psi
-    out[3] = slope * 2.0 * gr * psi_a
+    out[2] = slope
+    out[3] = slope * t * (2.0 * gd * psi_a - (1.0 - psi))
     return q[c, k] + x
 
 

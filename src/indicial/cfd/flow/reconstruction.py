@@ -2,13 +2,15 @@ r"""Second-order reconstruction: least-squares gradients and a smooth face limit
 
 A face between cells i and j with centres ``d`` apart takes from cell i, variable by variable,
 
-    q_L = q_i + psi(a, b) g_i . r,     b = q_j - q_i,     a = 2 g_i . d - b,
+    q_L = q_i + g_i . r - (1 - psi(a, b)) (r.d / d^2) g_i . d,     b = q_j - q_i,     a = 2 g_i . d - b,
     psi = 2 (max(a b, 0) + eps) / (a^2 + b^2 + 2 eps)
 
 with r from the cell's centre to the face's. On a straight line of cells a and b are the differences behind and
-ahead and psi g.d is the limited slope of van Albada, van Leer & Roberts (1982). ``eps = (h/c)^3``, h the cell
-spacing, leaves smooth extrema alone (Venkatakrishnan 1995). Density and pressure increments pass through
-``x / sqrt(1 + (x / (beta q))^2)``, which keeps them positive and is exact to third order.
+ahead and psi g.d is the limited slope of van Albada, van Leer & Roberts (1982). Only the change along d is limited:
+to scale the change across it, too, by a factor that turns on the small differences along d makes the scheme
+unstable on skewed cells. ``eps = (h/c)^3``, h the cell spacing, leaves smooth extrema alone (Venkatakrishnan 1995).
+Density and pressure increments pass through ``x / sqrt(1 + (x / (beta q))^2)``, which keeps them positive and is
+exact to third order.
 """
 
 from __future__ import annotations

@@ -44,9 +44,10 @@ def gradients(q, offsets, cells, weights, out):  # type: ignore[no-untyped-def]
 def _face_value(q, g, c, other, k, rx, ry, rz, dx, dy, dz, eps):  # type: ignore[no-untyped-def]
     """Variable k of cell c at a face shared with cell `other`; (dx, dy, dz) leads from c to it."""
     b = q[other, k] - q[c, k]
-    a = 2.0 * (g[c, k, 0] * dx + g[c, k, 1] * dy + g[c, k, 2] * dz) - b
-    psi, _, _ = limiter(a, b, eps)
-    x = psi * (g[c, k, 0] * rx + g[c, k, 1] * ry + g[c, k, 2] * rz)
+    along = g[c, k, 0] * dx + g[c, k, 1] * dy + g[c, k, 2] * dz
+    psi, _, _ = limiter(2.0 * along - b, b, eps)
+    t = (rx * dx + ry * dy + rz * dz) / (dx * dx + dy * dy + dz * dz)
+    x = g[c, k, 0] * rx + g[c, k, 1] * ry + g[c, k, 2] * rz - (1.0 - psi) * t * along
     if k == 0 or k == 4:
         x, _, _ = saturate(x, q[c, k])
     return q[c, k] + x

@@ -36,12 +36,12 @@ def shock_angle(mach: float, half_angle: float) -> float:
     return math.asin(sine)
 
 
-def outer_radius(x: ArrayLike, *, start: float, first: float, slope: float, limit: float) -> Array:
-    """Radius of the outer boundary at x: a cone from radius `first` at `start`, rounded off to the radius `limit`.
+def outer_radius(x: ArrayLike, *, first: float, slope: float, limit: float) -> Array:
+    """Radius of the outer boundary at x: a cone from radius `first` at x = 0, rounded off to the radius `limit`.
 
     Rounded by ``(a^-8 + b^-8)^(-1/8)`` of the two.
     """
-    cone = first + slope * (np.asarray(x, dtype=float) - start)
+    cone = first + slope * np.asarray(x, dtype=float)
     return np.asarray((cone**-8.0 + limit**-8.0) ** -0.125)
 
 

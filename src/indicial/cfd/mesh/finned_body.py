@@ -37,6 +37,9 @@ Resolution = Literal["quick", "coarse", "medium", "fine"]
 RESOLUTIONS: dict[Resolution, float] = {"quick": 1.0, "coarse": 1.5, "medium": 2.25, "fine": 3.375}
 """Cells along each direction relative to the quick mesh: each preset has 1.5 times as many as the one before."""
 
+NOSE_STEP = 0.025
+"""First step behind the tip, and radius of the inflow disc there, over the nose's length, on the quick mesh."""
+
 SPAN_CELLS, OUTER_CELLS, PLAIN_CELLS, QUADRANT_CELLS = 7, 8, 16, 8
 """Quick mesh: cells along a fin's span, beyond its tip, from a finless body outwards, round 90 degrees."""
 
@@ -136,12 +139,12 @@ def _frame(body: FinnedBody, factor: float, mach: float, margin: float) -> _Fram
     fins = body.fins
     largest = 0.5 if fins is None else 0.5 + fins.span
     planes, lead, trail = _planes(body, factor)
-    start, first = float(planes[0]), -0.5 * float(planes[0])
+    first = NOSE_STEP * body.nose.length
     if fins is not None:
-        slope = max(slope, (1.3 * largest - first) / (fins.root_leading_edge - start))
+        slope = max(slope, (1.3 * largest - first) / fins.root_leading_edge)
     beta = shock_angle(mach, body.nose.tip_half_angle)
     limit = max(1.5 * largest, margin * influence_limit(body.length, largest, beta))
-    outer = outer_radius(planes, start=start, first=first, slope=slope, limit=limit)
+    outer = outer_radius(planes, first=first, slope=slope, limit=limit)
     inner = body.radius(planes)
     if fins is None:
         s = plain_levels(inner, outer, max(2, round(PLAIN_CELLS * factor)))
@@ -156,8 +159,8 @@ def _frame(body: FinnedBody, factor: float, mach: float, margin: float) -> _Fram
 def _planes(body: FinnedBody, factor: float) -> tuple[Array, int, int]:
     """Axial stations [calibres], and the indices of the fins' leading and trailing edges."""
     nose, fins = body.nose, body.fins
-    tip_step, largest = 0.025 * nose.length, 0.6
-    anchors = [Anchor(-2.0 * tip_step, tip_step, tip_step), Anchor(0.0, tip_step, min(largest, 0.1 * nose.length))]
+    tip_step, largest = NOSE_STEP * nose.length, 0.6
+    anchors = [Anchor(0.0, tip_step, min(largest, 0.1 * nose.length))]
     if nose.length < body.length * (1.0 - 1e-9):
         anchors.append(Anchor(nose.length, min(0.16, 0.1 * nose.length), largest))
     edges = [0.0, 0.0]
