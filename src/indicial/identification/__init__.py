@@ -1,1 +1,29 @@
-"""identification"""
+"""Derivatives from flight: what a range measures, linear theory, output error, and how well they are determined."""
+
+from indicial.identification.accuracy import Accuracy, Whiteness
+from indicial.identification.estimate import Estimate
+from indicial.identification.linear_theory import LinearTheory, linear_theory
+from indicial.identification.measurement import Precision, RangeRecord, measure
+from indicial.identification.output_error import estimate, identify, reduce_linearly, start_values
+from indicial.identification.output_model import FREE_FLIGHT, OutputModel, build_output_model, substeps_needed
+from indicial.identification.result import IdentificationResult
+
+__all__ = [
+    "FREE_FLIGHT",
+    "Accuracy",
+    "Estimate",
+    "IdentificationResult",
+    "LinearTheory",
+    "OutputModel",
+    "Precision",
+    "RangeRecord",
+    "Whiteness",
+    "build_output_model",
+    "estimate",
+    "identify",
+    "linear_theory",
+    "measure",
+    "reduce_linearly",
+    "start_values",
+    "substeps_needed",
+]
