@@ -24,7 +24,20 @@ def oscillation(cycles: float = 3.0, **half: bool) -> History:
 
 def test_exact_model_is_found_exact() -> None:
     check = check_prediction(known_model(), oscillation())
-    assert check.worst < 1e-3  # the history's motion is taken linear between its samples
+    assert check.worst < 1e-4
+
+
+def test_motion_between_samples_is_followed_not_cut() -> None:
+    history = oscillation()
+    cut = check_prediction_linear(history)
+    assert check_prediction(known_model(), history).worst < 0.1 * cut
+
+
+def check_prediction_linear(history: History) -> float:
+    """Worst relative error with the motion linear between samples, over the outputs."""
+    found = known_model().predict(history, substeps=1)
+    errors = [np.sqrt(np.mean((found[n] - history[n]) ** 2)) / np.std(history[n]) for n in ("CN", "Cm")]
+    return float(max(errors))
 
 
 @pytest.mark.parametrize(("half", "column"), [({}, None), ({"rotates": False}, 0), ({"varies_alpha": False}, 3)])

@@ -9,13 +9,13 @@ import pytest
 
 from indicial.errors import InputError
 from indicial.motion import PitchOscillation
-from indicial.rom import StepResponse, StepResponses, check_prediction, realise
+from indicial.rom import StepResponse, StepResponses, check_prediction, deficiency_integral, realise
 from indicial.rom.era import era_modes, hankel
 from indicial.rom.modes import Modes, Target, fit_amplitudes, refine
 from rom.cases import COLUMNS, CONDITION, OUTPUTS, REFERENCE, ROWS, graded, known_system, plate, responses
 from theory.linear import NoisySolver, incompressible_airfoil, theodorsen
 
-GRID = graded(80.0, 200)
+GRID = graded(80.0, 120)
 JONES = ((0.165, 0.0455), (0.335, 0.3))  # R. T. Jones, NACA TR 681: phi = 1 - 0.165 e^-0.0455s - 0.335 e^-0.3s
 
 
@@ -43,11 +43,12 @@ def test_known_system_is_recovered_with_poles_feedthrough_and_gains() -> None:
 
 
 def test_step_to_model_to_step_is_the_identity() -> None:
-    model = realise(responses(known_system(), CONDITION, graded(150.0, 200)))
-    again = realise(model.step(graded(150.0, 200)))
+    # the integral is left free: the samples give it only to the accuracy of a quadrature
+    model = realise(responses(known_system(), CONDITION, graded(150.0, 150)), "modal", match_integral=False)
+    again = realise(model.step(graded(150.0, 150)), "modal", match_integral=False)
     s = np.linspace(0.0, 30.0, 77)
     for name in ("alpha", "q"):
-        np.testing.assert_allclose(again.step(s)[name].values, model.step(s)[name].values, atol=2e-5)
+        np.testing.assert_allclose(again.step(s)[name].values, model.step(s)[name].values, atol=1e-6)
 
 
 @pytest.mark.parametrize("method", ["exponential", "era", "modal"])
@@ -96,7 +97,7 @@ def test_wagner_response_gives_theodorsen_function() -> None:
 def test_complex_poles_serve_a_delay_better_than_real_ones() -> None:
     """A response that settles in finite time; the choice between the methods is by held-out error."""
     solver, condition = plate(3.0)
-    model = realise(responses(solver, condition, np.linspace(0.0, 8.0, 121)))
+    model = realise(responses(solver, condition, np.linspace(0.0, 8.0, 101)), max_order=5)
     assert model.method == "modal"
     for name in ("alpha", "q"):
         tried = [c for c in model.candidates if c.input == name]
@@ -110,7 +111,7 @@ def test_plate_oscillation_not_seen_is_predicted_within_2_percent_of_its_peak(ma
     solver, condition = plate(3.0)
     condition = replace(condition, mach=mach)
     end = 2.0 * mach / (mach - 1.0)
-    model = realise(responses(solver, condition, np.linspace(0.0, 2.0 * end, 161)), "modal")
+    model = realise(responses(solver, condition, np.linspace(0.0, 2.0 * end, 121)), "modal")
     for k in (0.05, 0.2):
         motion = PitchOscillation.from_reduced_frequency(condition, solver.reference, 0.01, k)
         times = np.linspace(0.0, 2.0 * motion.period, 160)
@@ -119,20 +120,21 @@ def test_plate_oscillation_not_seen_is_predicted_within_2_percent_of_its_peak(ma
             assert check[name].relative_peak < 0.02, check.summary()
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_noise_leaves_the_model_stable_small_and_near_the_truth(seed: int) -> None:
     noisy = responses(NoisySolver(known_system(), 0.01, seed), CONDITION, GRID)  # type: ignore[arg-type]
     settled = [
         replace(r, final=known_system().step(1e6)[ROWS, c]) for r, c in zip(noisy.responses, COLUMNS, strict=True)
     ]
-    model = realise(replace(noisy, responses=tuple(settled)), match_integral=False)
+    model = realise(replace(noisy, responses=tuple(settled)), max_order=4)
     assert np.all(model.poles.real < 0.0)
     assert model.order <= 8
     s = np.linspace(1.0, 40.0, 100)
     exact = known_system().step(s)
     for name, column in zip(("alpha", "q"), COLUMNS, strict=True):
         error = model.step(np.append(0.0, s))[name].values[1:] - exact[:, ROWS, column]
-        assert np.max(np.abs(error)) < 0.02 * np.max(np.abs(exact[:, ROWS, column]))
+        # four standard deviations of the noise, which the value at 0+ keeps in full
+        assert np.max(np.abs(error)) < 0.04 * np.max(np.abs(exact[:, ROWS, column]))
 
 
 @pytest.mark.parametrize("method", ["exponential", "era", "modal"])
@@ -145,6 +147,32 @@ def test_models_of_growing_or_random_data_are_stable(method: str) -> None:
             model = realise(data, method, order, match_integral=False)  # type: ignore[arg-type]
             assert model.order >= 1
             assert np.all(model.poles.real < 0.0)
+
+
+def test_rom_keeps_the_alphadot_derivative_of_the_indicial_method() -> None:
+    """With a final value from a steady solution that the record misses a little, as a solver's does."""
+    data = responses(known_system(), CONDITION, graded(60.0, 150))
+    finals = known_system().step(1e6)[np.ix_(ROWS, COLUMNS)] * (1.0 + 1e-5)
+    data = replace(data, responses=tuple(replace(r, final=finals[:, j]) for j, r in enumerate(data.responses)))
+    model = realise(data)
+    alpha = data["alpha"]
+    for i, name in enumerate(OUTPUTS):
+        integral = deficiency_integral(alpha.s, alpha.values[:, i], finals[i, 0])
+        assert model.derivatives().value(f"{name}_alphadot") == pytest.approx(-integral.value, rel=1e-9)
+        assert -integral.value == pytest.approx(known_system().slope()[ROWS[i], 0], rel=2e-3)
+
+
+def test_model_of_a_subsonic_section_refuses_the_lift_derivative_without_limit() -> None:
+    reference = replace(REFERENCE, length=1.0, moment_reference=(0.25, 0.0, 0.0))
+    airfoil = incompressible_airfoil(reference, 0.25)
+    s = np.concatenate([[0.0], np.geomspace(0.01, 500.0, 200)])
+    response = StepResponse("alpha", s, airfoil.step(s)[:, ROWS, 0], final=airfoil.step(1e12)[ROWS, 0])
+    data = StepResponses((response,), OUTPUTS, np.zeros(6), CONDITION, reference)
+    model = realise(data, order=4)
+    assert list(model.refused) == ["CN_alphadot"]
+    assert "CN_alphadot" not in model.derivatives().names()
+    assert "refused: CN_alphadot" in model.summary()
+    assert "CN_alphadot" in model.derivatives(0.1).names()
 
 
 def test_quasi_steady_output_beside_a_lagging_one_is_kept() -> None:
@@ -227,7 +255,7 @@ def test_constraints_hold_on_any_data() -> None:
 
 
 def test_candidates_tell_what_was_compared() -> None:
-    model = realise(responses(known_system(), CONDITION, graded(150.0, 200)))
+    model = realise(responses(known_system(), CONDITION, graded(150.0, 100)), max_order=3)
     for name in ("alpha", "q"):
         tried = [c for c in model.candidates if c.input == name]
         assert sum(c.chosen for c in tried) == 1

@@ -88,13 +88,13 @@ class ReducedModel(ABC):
         Parameters
         ----------
         motion : History or Motion
-            A history's motion is taken linear between its samples.
+            A history's motion is followed along local cubics through its samples.
         times : array_like, optional
             Instants [s], from 0 (0+); for a `Motion` only.
         neglect : tuple of str
             Inputs that may vary although the model has no response to them.
         substeps : int
-            For a `Motion`: into how many pieces, each linear, every interval of `times` is cut.
+            Into how many pieces, each linear, every interval is cut; 1 takes the motion linear between samples.
 
         Returns
         -------
@@ -110,7 +110,7 @@ class ReducedModel(ABC):
             self._check(motion.condition)
             if times is not None:
                 raise InputError("times are those of the history to predict; give times with a Motion only")
-            inputs = MotionInputs.from_history(motion, self.inputs, self.condition, neglect)
+            inputs = MotionInputs.from_history(motion, self.inputs, self.condition, neglect=neglect, substeps=substeps)
             time, velocity, rate = motion.time, motion.velocity, motion.rate
             condition, described = motion.condition, motion.motion
         else:

@@ -6,7 +6,7 @@ Each input gets modes of its own, shared by all outputs (`modes`). However the p
 - the final value as static gain, and
 - the integral of the deficiency function, hence the alphadot derivative of Eq. (17),
 
-exactly as the data have them, and it is stable by construction. Ways to the poles:
+exactly as the data give them, and it is stable by construction. Ways to the poles:
 
 ``exponential``
     real poles by variable projection: the classical sum of exponentials;
@@ -29,7 +29,8 @@ from scipy.linalg import block_diag
 from threadpoolctl import threadpool_limits
 
 from indicial.conventions import Array
-from indicial.errors import InputError
+from indicial.errors import InputError, NoLimitError
+from indicial.rom.deficiency import deficiency_integral
 from indicial.rom.era import era_modes, settling_time
 from indicial.rom.modes import Modes, Target, clipped, fit_amplitudes, refine
 from indicial.rom.response import StepResponse, StepResponses
@@ -149,17 +150,47 @@ def _scale(response: StepResponse) -> Array:
 
 def _target(response: StepResponse, keep: NDArray[np.intp], match_integral: bool) -> Target:
     """The fit's data: samples `keep`; initial value and integral of all samples."""
-    horizon = np.inf if response.final is None else float(response.s[-1])
-    curve = response.curve()
+    integral, horizon = _integral(response)
     return Target(
         s=response.s[keep],
         values=response.deficiency[keep],
         initial=response.deficiency[0],
-        integral=np.asarray(curve.integrate(0.0, response.s[-1])) if match_integral else None,
+        integral=integral if match_integral else None,
         horizon=horizon,
         weights=quadrature_weights(response.s[keep]),
         scale=_scale(response),
     )
+
+
+def _integral(response: StepResponse) -> tuple[Array, float]:
+    """Integral of the deficiency functions, shape (n_outputs,), and up to when.
+
+    Of all time, with the tail beyond the record where the final value is known and the tail can be judged; if it
+    cannot, or has no integral, of the record.
+    """
+    end = float(response.s[-1])
+    over_record = np.asarray(response.curve().integrate(0.0, end))
+    if response.final is None:
+        return over_record, np.inf
+    try:
+        parts = [
+            deficiency_integral(response.s, response.values[:, i], float(final))
+            for i, final in enumerate(response.final)
+        ]
+    except (NoLimitError, InputError):
+        return over_record, end
+    return np.array([part.value for part in parts]), np.inf
+
+
+def _halves(response: StepResponse, match_integral: bool) -> tuple[Target, Target]:
+    """Every second sample to fit, the others held out; the errors of both are means over the whole record."""
+    index = np.arange(response.s.size)
+    train = np.union1d(index[::2], index[-1:])
+    held = np.setdiff1d(index, train)
+    fitted = _target(response, train, match_integral)
+    weights = quadrature_weights(response.s)[held]
+    weights *= response.s[-1] / np.sum(weights)
+    return fitted, replace(fitted, s=response.s[held], values=response.deficiency[held], weights=weights)
 
 
 def _trials(
@@ -167,15 +198,7 @@ def _trials(
 ) -> list[_Trial]:
     if response.s.size < 6:
         raise InputError(f"step response to {response.input} has {response.s.size} samples, a realisation needs six")
-    index = np.arange(response.s.size)
-    train = np.union1d(index[::2], index[-1:])
-    held = np.setdiff1d(index, train)
-    fitted = _target(response, train, match_integral)
-    unseen = replace(fitted, s=response.s[held], values=response.deficiency[held])
-    unseen = replace(
-        unseen,
-        weights=quadrature_weights(response.s)[held] * response.s[-1] / np.sum(quadrature_weights(response.s)[held]),
-    )
+    fitted, unseen = _halves(response, match_integral)
     trials = []
     for method in methods:
         found: Modes | None = None

@@ -12,6 +12,7 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.interpolate import Akima1DInterpolator
 
 from indicial.conventions import Array, ReferenceQuantities, flow_angles, reduced_time
 from indicial.errors import InputError
@@ -77,7 +78,13 @@ class MotionInputs:
 
     @classmethod
     def from_history(
-        cls, history: History, names: tuple[str, ...], condition: FlightCondition, neglect: tuple[str, ...] = ()
+        cls,
+        history: History,
+        names: tuple[str, ...],
+        condition: FlightCondition,
+        *,
+        neglect: tuple[str, ...] = (),
+        substeps: int = 8,
     ) -> Self:
         """The inputs that made `history`.
 
@@ -91,6 +98,9 @@ class MotionInputs:
             The state from which inputs are counted.
         neglect : tuple of str
             Inputs that may vary without being among `names`.
+        substeps : int
+            Into how many linear pieces each interval is cut, along Akima's local cubics through the samples
+            (J. ACM 17, 1970); with 1 the motion is linear between samples.
 
         Raises
         ------
@@ -102,7 +112,11 @@ class MotionInputs:
         if history.motion.get("kind") in STEP_KINDS:
             name, amplitude = step_of(history)
             before[INPUTS.index(name)] -= amplitude
-        return cls(history.s, *_chosen(inputs, before, names, neglect))
+        values, start = _chosen(inputs, before, names, neglect)
+        if substeps == 1 or history.s.size < 3:
+            return cls(history.s, values, start)
+        fine = _refined(history.s, substeps)
+        return cls(fine, Akima1DInterpolator(history.s, values)(fine), start, stride=substeps)
 
     @classmethod
     def from_motion(
@@ -121,13 +135,18 @@ class MotionInputs:
         t = np.asarray(times, dtype=float)
         if t.ndim != 1 or t.size < 1 or t[0] != 0.0 or np.any(np.diff(t) <= 0.0):
             raise InputError("times must be one-dimensional, start at 0 (that is 0+) and strictly increase")
-        if substeps < 1:
-            raise InputError(f"substeps is {substeps}, must be at least 1")
-        fine = np.interp(np.arange(substeps * (t.size - 1) + 1), substeps * np.arange(t.size), t)
+        fine = _refined(t, substeps)
         inputs = _inputs(motion.velocity(fine), motion.rate(fine), speed, condition, reference)
         before = _inputs(motion.velocity_before[None], motion.rate_before[None], speed, condition, reference)[0]
         s = reduced_time(fine, speed, reference.length)
         return cls(s, *_chosen(inputs, before, names, neglect), stride=substeps)
+
+
+def _refined(samples: Array, substeps: int) -> Array:
+    if substeps < 1:
+        raise InputError(f"substeps is {substeps}, must be at least 1")
+    fine: Array = np.interp(np.arange(substeps * (samples.size - 1) + 1), substeps * np.arange(samples.size), samples)
+    return fine
 
 
 def _inputs(
