@@ -84,6 +84,14 @@ def test_damping_is_the_same_three_ways(results):
             assert arm["fitted_1_s"] == pytest.approx(arm["linearised_1_s"], rel=0.02)
 
 
+def test_identified_derivatives_are_those_flown_within_their_standard_errors(results):
+    found = {entry["name"]: entry for entry in results["identification"]["against_flown"]}
+    assert set(found) == {"CA_0", "CN_alpha", "Cm_alpha", "Cm_q+Cm_alphadot", "Cl_p"}
+    for entry in found.values():
+        assert abs(entry["standard_errors_off"]) < 3.5, entry
+        assert entry["standard_error"] < 0.15 * abs(entry["flown"]), entry
+
+
 def test_records_hold_every_field_of_the_schema(results):
     fields = {
         "name", "method", "mach", "alpha_deg", "beta_deg", "k", "amplitude_deg", "reduction", "value", "uncertainty",
@@ -95,7 +103,7 @@ def test_records_hold_every_field_of_the_schema(results):
         assert record["rate_normalisation"] == "c/2V"
         assert record["moment_reference_m"] == pytest.approx([5.5 * 0.03, 0.0, 0.0])
     methods = {record["method"] for record in results["derivatives"]}
-    assert {"mrf", "fom", "irm", "rom", "measured"} <= methods
+    assert {"mrf", "fom", "irm", "rom", "identified", "measured"} <= methods
 
 
 def test_report_is_one_file_that_needs_nothing_else(run, results):

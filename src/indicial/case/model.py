@@ -205,9 +205,10 @@ class Flight(Section):
 class Range(Section):
     """Spark-range measurements of that flight: stations, positions and angles with noise."""
 
-    stations: Annotated[int, Field(ge=10, le=1000, description="number of stations along the range")] = 54
+    stations: Annotated[int, Field(ge=12, le=1000, description="number of stations along the range")] = 54
     position_noise_m: Annotated[Positive, Field(description="standard deviation of a measured position")] = 0.001
-    angle_noise_deg: Annotated[Positive, Field(description="standard deviation of a measured angle")] = 0.05
+    angle_noise_deg: Annotated[Positive, Field(description="standard deviation of yaw and pitch")] = 0.1
+    roll_noise_deg: Annotated[Positive, Field(description="standard deviation of roll, measured if it rolls")] = 1.0
     seed: Annotated[int, Field(ge=0, description="seed of the noise: the same seed, the same noise")] = 1
 
 

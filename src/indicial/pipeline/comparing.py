@@ -14,7 +14,7 @@ from indicial.pipeline.context import Context, Outcome
 from indicial.reference_data import finner_range_at
 from indicial.report.comparison import comparison, comparison_text, statement
 
-COMPUTED = ("mrf", "fom", "irm", "rom")
+COMPUTED = ("mrf", "fom", "irm", "rom", "identify")
 SECTIONS = ("mesh", *COMPUTED, "fly")
 
 
@@ -41,6 +41,7 @@ def compare(context: Context) -> Outcome:
         "agreement": agreement,
         "rom": _plain(records["rom"]),
         "flight": _plain(records["fly"]),
+        "identification": _plain(records["identify"]),
         "damping": records["fly"]["damping"],
         "refused": records["irm"]["refused"],
         "statement": sentence,

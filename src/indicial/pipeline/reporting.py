@@ -13,13 +13,14 @@ from indicial.derivatives import DerivativeTable
 from indicial.history import History
 from indicial.pipeline.context import Context, Outcome
 from indicial.pipeline.flying import load_flights
+from indicial.pipeline.identifying import load_record
 from indicial.pipeline.reducing import STEPS, predictions
 from indicial.report.comparison import COLUMNS, ComparisonRow, comparison, comparison_figure
-from indicial.report.flight import LABELS, angle_figure, damping_figure, difference_figure, flight_figure
+from indicial.report.flight import LABELS, angle_figure, damping_figure, difference_figure, flight_figure, record_figure
 from indicial.report.html import Chapter, Grid, Picture, write_html
 from indicial.report.loads import convergence_figure, loop_figure, prediction_figure, step_figure
 from indicial.report.space import FlowPicture, flow_figure, mesh_figure
-from indicial.report.style import METHOD_NAMES, save
+from indicial.report.style import METHOD_SHORT, save
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,7 +31,7 @@ def write_report(context: Context) -> Outcome:
     folder = context.folder
     results = json.loads((folder.path / "results.json").read_text(encoding="utf-8"))
     rows = comparison(DerivativeTable.from_records(results["derivatives"]))
-    makers = [_comparison, _mesh_and_flow, _moving_frame, _oscillations, _steps, _models, _flights]
+    makers = [_comparison, _mesh_and_flow, _moving_frame, _oscillations, _steps, _models, _flights, _identification]
     chapters = []
     for done, maker in enumerate(makers):
         chapter = maker(context, results, rows)
@@ -63,7 +64,7 @@ def _picture(context: Context, name: str, make: Callable[[], Figure], caption: s
 
 
 def _comparison(context: Context, results: dict[str, Any], rows: list[ComparisonRow]) -> Chapter:
-    headings = ["derivative", *(METHOD_NAMES[method] for method in COLUMNS)]
+    headings = ["derivative", *(METHOD_SHORT[method] for method in COLUMNS)]
     cells = [[row.name, *(_cell(row, method) for method in COLUMNS)] for row in rows]
     agreement = [
         [a["what"], a["name"], f"{a['first']:.5g}", f"{a['second']:.5g}", f"{a['difference']:+.2%}"]
@@ -73,8 +74,11 @@ def _comparison(context: Context, results: dict[str, Any], rows: list[Comparison
     return Chapter(
         "Comparison",
         [
-            "Per radian; rates made dimensionless as q d/2V. The number after ± is one standard error; what follows in "
-            "brackets is the difference from the measured value.",
+            "Per radian; rates made dimensionless as q d/2V. The number after ± is one standard error; below it the "
+            "difference from the value measured in free flight (negative: too small in size). MRF: steady states in a "
+            f"moving frame; FOM: forced oscillation at k = {results['case']['forced_oscillation']['k']:g}; IRM: "
+            "response to steps; model: the state-space model made of those responses, at k = 0; identified: from the "
+            "simulated range record of the flight that was flown with that model.",
             f"Measured data: {results['measured_data']}",
         ],
         [
@@ -110,7 +114,7 @@ def _cell(row: ComparisonRow, method: str) -> str:
     if record.uncertainty is not None:
         text += f" ± {record.uncertainty:.2g}"
     deviation = row.deviation(method)
-    return text if deviation is None or method == "measured" else f"{text} ({deviation:+.0%})"
+    return text if deviation is None or method == "measured" else f"{text}\n{deviation:+.0%}"
 
 
 def _mesh_and_flow(context: Context, results: dict[str, Any], rows: list[ComparisonRow]) -> Chapter:
@@ -247,3 +251,27 @@ def _flights(context: Context, results: dict[str, Any], rows: list[ComparisonRow
         _picture(context, "damping", lambda: damping_figure(damping), "Damping, three ways."),
     ]
     return Chapter("Flight", [results["flight"]["comparison"]["summary"]], [grid], pictures)
+
+
+def _identification(context: Context, results: dict[str, Any], rows: list[ComparisonRow]) -> Chapter:
+    found = results["identification"]
+    cells = [
+        [
+            entry["name"],
+            f"{entry['identified']:.5g} ± {entry['standard_error']:.2g}",
+            f"{entry['flown']:.5g}",
+            f"{entry['standard_errors_off']:+.1f}",
+        ]
+        for entry in found["against_flown"]
+    ]
+    grid = Grid(
+        ["derivative", "identified", "flown with", "off by standard errors"],
+        cells,
+        "What the record gives, and what was flown: free flight tells only the sum of the two damping derivatives",
+    )
+    record = load_record(context)
+    residuals = {name: np.array(values) for name, values in found["residuals"].items()}
+    caption = "Dots: what the range measured, with noise; lines: the fitted flight. Below, what the fit leaves."
+    picture = _picture(context, "identification", lambda: record_figure(record, residuals, found["noise"]), caption)
+    text = f"{found['stations']} stations, {found['iterations']} steps of the maximum-likelihood fit."
+    return Chapter("Identification", [text], [grid], [picture])

@@ -48,7 +48,14 @@ _LIST = (
     Stage("irm", "Indicial response (IRM)", ("mesh",), (*_CFD, "indicial_response"), "deriving:derive"),
     Stage("rom", "Reduced-order model", ("fom", "irm"), ("rom", "forced_oscillation"), "reducing:reduce"),
     Stage("fly", "Flights and damping", ("mrf", "irm", "rom"), ("vehicle", "flight"), "flying:fly_twice"),
-    Stage("compare", "Comparison", ("mrf", "fom", "irm", "rom", "fly"), ("title", "comparison"), "comparing:compare"),
+    Stage("identify", "Identification", ("fly",), ("range",), "identifying:identify_flight"),
+    Stage(
+        "compare",
+        "Comparison",
+        ("mrf", "fom", "irm", "rom", "fly", "identify"),
+        ("title", "comparison"),
+        "comparing:compare",
+    ),
     Stage("report", "Figures and report", ("compare",), ("title",), "reporting:write_report"),
 )
 STAGES = {stage.name: stage for stage in _LIST}

@@ -50,11 +50,11 @@ class ComparisonRow:
         return self.records.get("measured")
 
     def deviation(self, method: str) -> float | None:
-        """(value - measured)/|measured|, or None where one is missing."""
+        """value/measured - 1 (negative: too small in size), or None where one is missing."""
         record, measured = self.records.get(method), self.measured
         if record is None or measured is None or measured.value == 0.0:
             return None
-        return (record.value - measured.value) / abs(measured.value)
+        return record.value / measured.value - 1.0
 
 
 def comparison(table: DerivativeTable) -> list[ComparisonRow]:

@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from indicial.conventions import Array
 from indicial.flightsim import Trajectory
-from indicial.report.style import BLACK, BLUE, GREY, ORANGE, VERMILION, figure_style
+from indicial.identification import RangeRecord
+from indicial.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILION, figure_style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LABELS = {"derivatives": "derivative model", "rom": "state-space model in the loop"}
+_CHANNEL_COLOURS = (BLACK, BLUE, ORANGE, GREEN, PURPLE, VERMILION)
 _STYLES = {"derivatives": (BLUE, "-"), "rom": (VERMILION, "--")}
 
 
@@ -95,4 +98,35 @@ def damping_figure(damping: Mapping[str, Mapping[str, Any]]) -> Figure:
         axes.axhline(0.0, color=BLACK, lw=0.8)
         axes.set_ylabel("damping [1/s] (negative: dies out)")
         axes.legend(fontsize=8)
+        return figure
+
+
+def record_figure(record: RangeRecord, residuals: Mapping[str, Array], noise: Mapping[str, float]) -> Figure:
+    """Measured and fitted angles and swerve along the range, and the residuals in standard deviations.
+
+    Parameters
+    ----------
+    record : RangeRecord
+    residuals : mapping
+        Measured less fitted, by channel [m] or [rad].
+    noise : mapping
+        Standard deviation of each channel, in the same units.
+    """
+    panels = ((("pitch", "yaw"), "angle [deg]", math.degrees(1.0)), (("y", "z"), "swerve [mm]", 1e3))
+    with figure_style() as plt:
+        figure: Figure
+        figure, axes = plt.subplots(3, 1, figsize=(8.6, 8.0), sharex=True)
+        for ax, (names, label, scale) in zip(axes, panels, strict=False):
+            for name, colour in zip(names, (BLUE, ORANGE), strict=True):
+                measured = getattr(record, name)
+                ax.plot(record.x, scale * measured, ".", color=colour, label=f"{name}, measured")
+                ax.plot(record.x, scale * (measured - residuals[name]), color=colour, lw=0.8, label=f"{name}, fitted")
+            ax.set_ylabel(label)
+            ax.legend(fontsize=8, ncols=2)
+        for (name, values), colour in zip(residuals.items(), _CHANNEL_COLOURS, strict=False):
+            axes[2].plot(record.x, values / noise[name], ".", color=colour, ms=4, label=name)
+        axes[2].axhspan(-2.0, 2.0, color=GREY, alpha=0.12, label="95% of white noise")
+        axes[2].set_ylabel("residual / standard deviation")
+        axes[2].set_xlabel("distance down the range [m]")
+        axes[2].legend(fontsize=8, ncols=4)
         return figure

@@ -33,6 +33,14 @@ METHOD_NAMES = {
     "identified": "identified from the flight",
     "measured": "measured in free flight",
 }
+METHOD_SHORT = {
+    "mrf": "MRF",
+    "fom": "FOM",
+    "irm": "IRM",
+    "rom": "model",
+    "identified": "identified",
+    "measured": "free flight",
+}
 
 _SYMBOLS = {
     "CN": "C_N",
