@@ -46,23 +46,24 @@ def simulate(a: Array, b: Array, s: Array, values: Array, start: Array) -> Array
     digits = 11 - np.floor(np.log10(step)).astype(int)
     scale = 10.0 ** digits.astype(float)
     sizes, which = np.unique(np.round(step * scale) / scale, return_inverse=True)
-    transition, gain, ramp = hold_matrices(a, b, sizes)
-    forcing = np.einsum("kij,kj->ki", gain[which], values[:-1])
-    forcing += np.einsum("kij,kj->ki", ramp[which], np.diff(values, axis=0))
-    states: Array = _march(transition, which.astype(np.intp), forcing, start)
+    p, g, r = (np.ascontiguousarray(matrix) for matrix in hold_matrices(a, b, sizes))
+    states: Array = _march(p, g, r, which.astype(np.intp), np.ascontiguousarray(values), start)
     return states
 
 
 @numba.njit(cache=True)
-def _march(transition: Array, which: NDArray[np.intp], forcing: Array, start: Array) -> Array:
-    count, order = forcing.shape
-    states = np.empty((count + 1, order))
+def _march(p: Array, g: Array, r: Array, which: NDArray[np.intp], values: Array, start: Array) -> Array:
+    count, inputs = values.shape
+    order = start.size
+    states = np.empty((count, order))
     states[0] = start
-    for k in range(count):
-        phi = transition[which[k]]
+    for k in range(count - 1):
+        w = which[k]
         for i in range(order):
-            value = forcing[k, i]
+            state = 0.0
             for j in range(order):
-                value += phi[i, j] * states[k, j]
-            states[k + 1, i] = value
+                state += p[w, i, j] * states[k, j]
+            for m in range(inputs):
+                state += g[w, i, m] * values[k, m] + r[w, i, m] * (values[k + 1, m] - values[k, m])
+            states[k + 1, i] = state
     return states
