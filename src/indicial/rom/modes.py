@@ -107,7 +107,7 @@ class Modes:
         return lower, upper
 
     def state_space(self, amplitudes: Array) -> tuple[Array, Array, Array]:
-        """Real (A, b, C) with ``C (I - e^{As}) ...``: step response ``F(0) - F(s)`` from rest.
+        """Real (A, b, C) whose response to a unit step, from rest, is ``F(0) - F(s)``.
 
         Parameters
         ----------
