@@ -8,10 +8,11 @@ do not roll (y right, z down), ``L = rho S CL_alpha/2m`` and V = V0 exp(-b s):
     sigma  = c0 + c1 s - L sum of K/lambda^2 exp(lambda s) + i g (exp(2 b s) - 1 - 2 b s)/(4 b^2 V0^2)
     phi    = r0 + r1 (1 - exp(-k s))/k,                         k = -rho S c^2 Cl_p/(2 f Ix) - b  (no fin cant)
 
-with ``K = A/(1 + L/lambda)`` the arms of the incidence, f = 2 for rates per c/2V and 1 for c/V. The two roots give
+with ``K = A/(1 + L/lambda)`` the arms of the incidence, f = 2 for rates per c/2V and 1 for c/V. The fast and slow arm
+share what the theory of a missile without Magnus moment has them share, so that an arm which hardly moves does no harm:
 
-    H = -Re(lambda_F + lambda_S) = (rho S/2m)(CL_alpha - CD - (m c^2/f Iy)(Cm_q + Cm_alphadot))
-    M = -Re(lambda_F lambda_S)   = rho S c Cm_alpha/2 Iy
+    lambda = (-(H - iP) +- sqrt((H - iP)^2 + 4 M))/2,           P = (Ix/Iy) p/V
+    H = (rho S/2m)(CL_alpha - CD - (m c^2/f Iy)(Cm_q + Cm_alphadot)),  M = rho S c Cm_alpha/2 Iy
 
 Murphy, "Free Flight Motion of Symmetric Missiles", BRL R-1216 (1963); McCoy, "Modern Exterior Ballistics" (1999),
 ch. 10 and 14. It needs no start values, and gives them to the output error method.
@@ -29,7 +30,8 @@ from numpy.typing import NDArray
 from indicial.conventions import Array, ReferenceQuantities
 from indicial.derivatives import DerivativeTable
 from indicial.errors import InputError
-from indicial.flightsim import EpicyclicFit, Vehicle, fit_epicycle
+from indicial.flightsim import Arm, EpicyclicFit, Vehicle
+from indicial.flightsim.epicycle import order_arms
 from indicial.identification.estimate import Estimate, identified_table
 from indicial.identification.measurement import RangeRecord
 from indicial.motion import FlightCondition
@@ -38,6 +40,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Complex = NDArray[np.complex128]
+
+_EXPLAINED = 0.2  # least part of the angles' variance that the epicycle must account for
 
 
 @dataclass(frozen=True)
@@ -56,7 +60,7 @@ class LinearTheory:
     mach : float
         At the middle of the record.
     mean_square_yaw : float
-        Mean square of the total incidence [rad^2].
+        Mean square of the total incidence, weighted as the drag of the record is [rad^2].
     reference : ReferenceQuantities
     record : RangeRecord
     fitted : ndarray
@@ -148,13 +152,15 @@ def linear_theory(
     Raises
     ------
     InputError
-        If the angles do not oscillate or cannot be told from noise.
+        If no oscillation of the angles, of at least one wavelength, can be told from noise.
     """
     s = record.x - record.x[0]
     drag = _fit_drag(s, record.time)
     attitude = -record.yaw + 1j * (record.pitch + drag.turned(s, g))
-    epicycle = fit_epicycle(s, attitude)
-    roots, root_variance = _root_variance(epicycle, s, attitude)
+    roll, roll_slope, roll_decay, roll_variance = (0.0,) * 4 if record.roll is None else _fit_roll(s, record.roll)
+    spin = roll_slope * float(np.mean(np.exp(-roll_decay * s)))
+    motion = _fit_epicycle(s, attitude, vehicle.inertia[0, 0] / vehicle.inertia[1, 1] * spin)
+    epicycle = motion.fit
     swerve = record.y + 1j * (record.z - drag.dropped(s, g))
     lift, lift_variance, constants = _fit_swerve(epicycle, s, swerve)
 
@@ -163,37 +169,32 @@ def linear_theory(
     transverse = vehicle.inertia[1, 1]
     per_metre = density * reference.area / (2.0 * vehicle.mass)
     radius = vehicle.mass * reference.length**2 / (factor * transverse)
-    damping, stiffness = -float(roots.sum().real), -float(roots.prod().real)
-    if not stiffness < 0.0:
-        raise InputError("the angles of this record do not oscillate: linear theory cannot reduce it")
 
-    incidence = _incidence(epicycle, lift, s)
-    mean_square = float(np.mean(np.abs(incidence) ** 2))
+    # the parabola fitted to time weighs the drag at s by s^2 (l - s)^2, that is by the square of the swerve it makes
+    weight = s**2 * (s[-1] - s) ** 2
+    mean_square = float(np.average(np.abs(_incidence(epicycle, lift, s)) ** 2, weights=weight))
     drag_coefficient = drag.decay / per_metre
     lift_slope = lift / per_metre
     normal_slope = lift_slope + drag_coefficient
     axial = drag_coefficient - normal_slope * mean_square
-    total = (lift_slope - drag_coefficient - damping / per_metre) / radius
+    total = (lift_slope - drag_coefficient - motion.damping / per_metre) / radius
     pressure = density * reference.area * reference.length / (2.0 * transverse)
-    # variances of H and M from those of the roots; drag, attitude and swerve are independent fits
-    damping_variance, stiffness_variance = root_variance
+    # drag, attitude and swerve are independent fits: their variances add
     drag_variance = drag.variance / per_metre**2
     slope_variance = lift_variance / per_metre**2
     derivatives = [
-        Estimate("CA_0", axial, math.sqrt(drag_variance)),
+        Estimate("CA_0", axial, math.sqrt(drag_variance + mean_square**2 * slope_variance)),
         Estimate("CN_alpha", normal_slope, math.sqrt(slope_variance + drag_variance)),
-        Estimate("Cm_alpha", stiffness / pressure, math.sqrt(stiffness_variance) / pressure),
+        Estimate("Cm_alpha", motion.stiffness / pressure, math.sqrt(motion.stiffness_variance) / pressure),
         Estimate(
             "Cm_q+Cm_alphadot",
             total,
-            math.sqrt(slope_variance + drag_variance + damping_variance / per_metre**2) / radius,
+            math.sqrt(slope_variance + drag_variance + motion.damping_variance / per_metre**2) / radius,
         ),
     ]
-    roll, roll_slope = 0.0, 0.0
     if record.roll is not None:
-        roll, roll_slope, decay, variance = _fit_roll(s, record.roll)
         scale = density * reference.area * reference.length**2 / (2.0 * factor * vehicle.inertia[0, 0])
-        derivatives.append(Estimate("Cl_p", -(decay + drag.decay) / scale, math.sqrt(variance) / scale))
+        derivatives.append(Estimate("Cl_p", -(roll_decay + drag.decay) / scale, math.sqrt(roll_variance) / scale))
     return LinearTheory(
         derivatives=tuple(derivatives),
         initial=_initial(record, drag, epicycle, constants, (roll, roll_slope), g),
@@ -242,25 +243,83 @@ def _fit_drag(s: Array, time: Array) -> _Drag:
     return _Drag(1.0 / float(values[1]), float(values[2]), float(covariance[2, 2]))
 
 
-def _root_variance(epicycle: EpicyclicFit, s: Array, attitude: Complex) -> tuple[Complex, tuple[float, float]]:
-    """Roots (fast, slow) [1/m], and variances of H = -Re(sum) and M = -Re(product)."""
-    arms = (epicycle.fast, epicycle.slow)
-    roots = np.array([arm.eigenvalue for arm in arms])
-    waves = np.exp(np.outer(s, roots))
-    amplitudes = np.array([arm.amplitude for arm in arms])
-    complex_columns = np.hstack([waves * amplitudes * s[:, None], waves, np.ones((s.size, 1))])
-    # every complex unknown is two real ones, whose columns are g and i g
-    columns = np.hstack([complex_columns, 1j * complex_columns])
+@dataclass(frozen=True)
+class _Motion:
+    """Epicycle, H [1/m] and M [1/m^2] with their variances."""
+
+    fit: EpicyclicFit
+    damping: float
+    stiffness: float
+    damping_variance: float
+    stiffness_variance: float
+
+
+def _fit_epicycle(s: Array, attitude: Complex, gyration: float) -> _Motion:
+    """Fit H and M at given P = `gyration` [1/m], amplitudes and trim eliminated (variable projection).
+
+    It starts from the best of a scan of undamped motions, up to two stations a wavelength.
+    """
+    from scipy.optimize import least_squares
+
+    length = s[-1]
+
+    def waves(damping: float, stiffness: float) -> Complex:
+        exponents = np.outer(s, _roots(damping, stiffness, gyration))
+        # trial roots far off may grow beyond any float
+        return np.column_stack([np.exp(np.minimum(exponents.real, 50.0) + 1j * exponents.imag), np.ones_like(s)])
+
+    def misfit(scaled: Array) -> Array:
+        basis = waves(scaled[0] / length, scaled[1] / length**2)
+        error = basis @ np.linalg.lstsq(basis, attitude, rcond=None)[0] - attitude
+        return np.concatenate([error.real, error.imag])
+
+    highest = math.pi * (s.size - 1)
+    start = np.array([1.0, -(_best_turning(s / length, attitude, highest) ** 2)])
+    found = least_squares(misfit, start, x_scale="jac").x
+    damping, stiffness = float(found[0] / length), float(found[1] / length**2)
+    basis = waves(damping, stiffness)
+    first, second, trim = np.linalg.lstsq(basis, attitude, rcond=None)[0]
+    explained = 1.0 - np.sum(misfit(found) ** 2) / np.sum(np.abs(attitude - attitude.mean()) ** 2)
+    if not (-(highest**2) < found[1] < -((2.0 * math.pi) ** 2) and explained > _EXPLAINED):
+        raise InputError(
+            "the angles of this record do not oscillate above their noise: give a larger yaw, or more stations"
+        )
+    roots = _roots(damping, stiffness, gyration)
+    arms = {complex(r): Arm(complex(a), complex(r)) for r, a in zip(roots, (first, second), strict=True)}
+    fast, slow = order_arms(complex(roots[0]), complex(roots[1]))
+    residual = basis @ np.array([first, second, trim]) - attitude
+    half = np.array([1.0, -1.0]) * (roots[0] - roots[1]) / 2.0
+    by_damping = -0.5 + (damping - 1j * gyration) / (4.0 * half)
+    by_stiffness = 1.0 / (2.0 * half)
+    moving = s[:, None] * basis[:, :2] * np.array([first, second])
+    # every complex amplitude is two real ones, whose columns are g and i g
+    columns = np.column_stack([moving @ by_damping, moving @ by_stiffness, basis, 1j * basis])
     jacobian = np.vstack([columns.real, columns.imag])
     size = np.linalg.norm(jacobian, axis=0)
-    misfit = epicycle(s) - attitude
-    covariance = _variances(jacobian / size, np.concatenate([misfit.real, misfit.imag])) / np.outer(size, size)
-    n = complex_columns.shape[1]
-    picked = covariance[np.ix_([0, 1, n, n + 1], [0, 1, n, n + 1])]
-    by_sum = np.array([-1.0, -1.0, 0.0, 0.0])
-    other = roots[::-1]
-    by_product = np.concatenate([-other.real, other.imag])
-    return roots, (float(by_sum @ picked @ by_sum), float(by_product @ picked @ by_product))
+    variances = np.diag(_variances(jacobian / size, np.concatenate([residual.real, residual.imag]))) / size**2
+    return _Motion(
+        EpicyclicFit(arms[fast], arms[slow], complex(trim), float(np.sqrt(np.mean(np.abs(residual) ** 2)))),
+        damping,
+        stiffness,
+        float(variances[0]),
+        float(variances[1]),
+    )
+
+
+def _best_turning(s: Array, attitude: Complex, highest: float) -> float:
+    """Turning rate [rad] per unit of s, of those up to `highest`, of the undamped arms that fit best."""
+    turning = np.arange(math.pi, highest, 0.5)
+    wave = np.exp(1j * turning[:, None] * s)
+    basis, _ = np.linalg.qr(np.stack([wave, wave.conj(), np.ones_like(wave)], axis=-1))
+    power = np.sum(np.abs(np.einsum("wsi,s->wi", basis.conj(), attitude)) ** 2, axis=1)
+    return float(turning[np.argmax(power)])
+
+
+def _roots(damping: float, stiffness: float, gyration: float) -> Complex:
+    """Both lambda [1/m] of H, M and P."""
+    middle = -0.5 * (damping - 1j * gyration)
+    half = np.sqrt(middle**2 + stiffness)
+    return np.array([middle + half, middle - half])
 
 
 def _incidence(epicycle: EpicyclicFit, lift: float, s: Array) -> Complex:

@@ -6,8 +6,8 @@ constant)
     J = sum over stations and channels of  r^2/(2 sigma_c^2) + ln sigma_c,
 
 minimised by Gauss-Newton steps, damped (Levenberg-Marquardt) where they fail, with the exact sensitivities of
-`output_model`, and over sigma by ``sigma_c^2 = sum r^2/(n - h_c)``. There h_c, the sum of the channel's leverages, is how
-many of the unknowns the channel paid for; the plain maximum-likelihood estimate, with h_c = 0, is too small by just that.
+`output_model`, and over sigma by ``sigma_c^2 = sum r^2/(n - h_c)``. There h_c, the sum of the channel's leverages, is
+how many of the unknowns the channel paid for; the plain maximum-likelihood estimate, with h_c = 0, is too small.
 Klein & Morelli, "Aircraft System Identification" (2006), ch. 6; Chapman & Kirk, AIAA J. 8 (1970) for free flight.
 """
 
