@@ -42,7 +42,7 @@ def test_case_gives_condition_and_reference_in_si_units_and_radians():
         ("diameter_m = 0.030", "diameter_m = -0.03", r"shape\.diameter_m: is -0.03; allowed: a number in metres great"),
         ("root_chord_calibres = 1.0", "root_chord_calibres = 9.0", r"shape\.fins\.root_chord_calibres: reaches onto"),
         ("k = 0.1", "k = -0.1", r"forced_oscillation\.k: is -0.1; allowed: a number greater than 0"),
-        ('nose = "cone"', 'nose = "blunt"', r"shape\.nose: is 'blunt'; allowed: 'cone' or 'ogive'"),
+        ('nose = "cone"', 'nose = "blunt"', r"shape\.nose: is 'blunt'; allowed: 'cone' or 'tangent_ogive'"),
         ("[vehicle]", "[vehcile]", r"f\.toml: vehcile: unknown key; did you mean 'vehicle'"),
         ("axial_inertia_kg_m2 = 1.92e-4", "axial_inertia_kg_m2 = 1.0", r"vehicle\.axial_inertia_kg_m2: no body has it"),
         ("initial_alpha_deg = 2.0", "initial_alpha_deg = 0.0", r"flight\.initial_alpha_deg: is 0"),

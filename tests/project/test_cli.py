@@ -1,0 +1,65 @@
+"""The command line: one clear line for whatever is wrong, and the exit code that says whose fault it is."""
+
+import subprocess
+import sys
+
+import pytest
+from typer.testing import CliRunner
+
+import indicial
+from indicial.cli.commands import app
+from indicial.reference_data import find_case
+
+COMMANDS = ("run", "mesh", "derive", "rom", "fly", "identify", "compare", "report")
+
+
+def indicial_command(*arguments: str, cwd=None) -> subprocess.CompletedProcess:
+    code = "from indicial.cli import main; main()"
+    return subprocess.run(
+        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, cwd=cwd, check=False
+    )
+
+
+def test_version_is_the_package_version():
+    assert CliRunner().invoke(app, ["--version"]).stdout.strip() == f"indicial {indicial.__version__}"
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_of_every_command_has_an_example(command):
+    result = CliRunner().invoke(app, [command, "--help"], env={"COLUMNS": "200"})
+    assert result.exit_code == 0
+    assert f"indicial {command}" in result.stdout
+
+
+def test_wrong_input_gives_one_line_and_exit_code_2(tmp_path):
+    quick = find_case("basic_finner_quick").read_text(encoding="utf-8")
+    (tmp_path / "typo.toml").write_text(quick.replace("mach =", "mahc ="))
+    (tmp_path / "empty.toml").write_text("")
+    (tmp_path / "folder").mkdir()
+    wrong = {
+        ("run", "nothing.toml"): "no such case file",
+        ("run", "typo.toml"): "condition.mahc: unknown key; did you mean 'mach'?",
+        ("run", "empty.toml"): "missing",
+        ("mesh", "folder"): "not a run folder",
+        ("fly", "basic_finner_quick"): "not there yet",
+        ("run", "basic_finner_quick", "--output", "typo.toml"): "is a file; --output must name a folder",
+    }
+    for arguments, message in wrong.items():
+        done = indicial_command(*arguments, cwd=tmp_path)
+        assert done.returncode == 2, arguments
+        assert message in done.stderr, arguments
+        assert len(done.stderr.strip().splitlines()) == 1, done.stderr
+        assert done.stdout == ""
+
+
+def test_a_refused_case_leaves_nothing_behind(tmp_path):
+    (tmp_path / "bad.toml").write_text("title = 3")
+    indicial_command("run", "bad.toml", cwd=tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["bad.toml"]
+
+
+def test_mesh_stage_runs_away_from_the_checkout(tmp_path):
+    done = indicial_command("mesh", "data/cases/basic_finner_quick.toml", "--output", "here", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "here" / "mesh" / "half.npz").is_file()
+    assert "cells (half)" in done.stderr
