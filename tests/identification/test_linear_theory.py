@@ -93,11 +93,11 @@ def test_roll_damping_is_that_of_the_flight():
 
 def test_errors_scatter_as_stated():
     errors = []
-    for seed in range(150):
+    for seed in range(80):
         theory = reduce_linearly(measure(flight(), seed=seed), FINNER)
         errors.append([(e.value - TRUTH[e.name]) / e.standard_error for e in theory.derivatives])
-    # the scatter of 150 normal numbers is known to 6%; CA_0, whose residuals hold the wave of yaw drag, to less
-    np.testing.assert_allclose(np.std(errors, axis=0), 1.0, atol=0.25)
+    # the scatter of 80 normal numbers is known to 8%; CA_0, whose residuals hold the wave of yaw drag, to less
+    np.testing.assert_allclose(np.std(errors, axis=0), 1.0, atol=0.3)
 
 
 def test_a_record_without_oscillation_is_refused():
@@ -107,8 +107,12 @@ def test_a_record_without_oscillation_is_refused():
     record = RangeRecord(s / 687.0, s, *noise)
     with pytest.raises(InputError, match="do not oscillate"):
         linear_theory(record, FINNER, DENSITY, SOUND, 0.0)
-    unstable = DerivativeAerodynamics(reference=FINNER.reference, CA_0=0.5, CN_alpha=5.0, Cm_alpha=1.0, Cm_q=-300.0)
-    with pytest.raises(InputError, match="do not oscillate"):
+
+
+@pytest.mark.parametrize(("slope", "message"), [(0.3, "do not oscillate"), (1.0, "tumbles")])
+def test_an_unstable_missile_is_refused(slope, message):
+    unstable = DerivativeAerodynamics(reference=FINNER.reference, CA_0=0.5, CN_alpha=5.0, Cm_alpha=slope, Cm_q=-300.0)
+    with pytest.raises(InputError, match=message):
         reduce_linearly(measure(fly_range(unstable, alpha_deg=0.5), seed=1), FINNER)
 
 

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
 Complex = NDArray[np.complex128]
 
+_LARGEST = math.radians(45.0)  # angles that are small no more
 _EXPLAINED = 0.2  # least part of the angles' variance that the epicycle must account for
 
 
@@ -154,6 +155,8 @@ def linear_theory(
     InputError
         If no oscillation of the angles, of at least one wavelength, can be told from noise.
     """
+    if max(np.max(np.abs(record.yaw)), np.max(np.abs(record.pitch))) > _LARGEST:
+        raise InputError("the angles of this record exceed 45 deg: the missile tumbles, linear theory cannot reduce it")
     s = record.x - record.x[0]
     drag = _fit_drag(s, record.time)
     attitude = -record.yaw + 1j * (record.pitch + drag.turned(s, g))

@@ -55,7 +55,8 @@ _SHORT = 1e-4  # standard errors; a step shorter than this is the last
 _MAX_STEPS = 60
 _MAX_DAMPING = 1e9
 _NOISE_CHANGE = 1e-3  # relative; noise that changes less is settled
-_SMALLEST_NOISE = 1e-6  # of the stated; residuals below it are the integrator's
+_SMALLEST_NOISE = 1e-3  # of the stated; residuals below it are the integrator's
+_NO_EFFECT = 1e-6  # standard deviations; what a value changes by less is not seen
 _POSITIVE = ("CA_0", "Vx")
 
 
@@ -224,7 +225,7 @@ def _maximise_likelihood(
     stated = record.standard_deviations
     sigma, damping = stated, 0.0
     point = _look(record, model, start)
-    _check_effects(model, point)
+    _check_effects(record, model, point)
     cost = [_cost(point.residuals, sigma)]
     while len(cost) <= _MAX_STEPS and damping < _MAX_DAMPING:
         step, length = _step(*point.whitened(sigma), damping)
@@ -264,10 +265,11 @@ def _residuals(record: RangeRecord, outputs: Array) -> Array:
     return difference
 
 
-def _check_effects(model: OutputModel, point: _Point) -> None:
-    size = np.max(np.abs(point.sensitivities), axis=(0, 1))
-    for name, effect in zip(model.names, size, strict=True):
-        if effect == 0.0:
+def _check_effects(record: RangeRecord, model: OutputModel, point: _Point) -> None:
+    """Refuse an unknown whose whole value, or 1, changes nothing that could be measured."""
+    effect = np.max(np.abs(point.sensitivities / record.standard_deviations[:, None]), axis=(0, 1))
+    for name, value, size in zip(model.names, point.unknowns, effect, strict=True):
+        if size * max(1.0, abs(value)) < _NO_EFFECT:
             raise InputError(f"{name} has no effect on this record: hold it, or give a flight that depends on it")
 
 

@@ -1,0 +1,88 @@
+import numpy as np
+import pytest
+
+from indicial.conventions import Array
+from indicial.identification.accuracy import assess, coloured_covariance, cramer_rao, neighbour_test, undetermined
+
+
+def first_order_noise(rng: np.random.Generator, rho: float, shape: tuple[int, int]) -> Array:
+    """Unit noise, first order along the last axis."""
+    shocks = rng.standard_normal(shape)
+    shocks[:, 1:] *= np.sqrt(1.0 - rho**2)
+    noise = shocks.copy()
+    for i in range(1, shape[1]):
+        noise[:, i] += rho * noise[:, i - 1]
+    return noise
+
+
+def regressors(n: int) -> Array:
+    """Decaying waves and a line, shape (n, 4)."""
+    t = np.linspace(0.0, 1.0, n)
+    return np.stack([np.exp(-t) * np.sin(40 * t), np.exp(-t) * np.cos(40 * t), np.ones(n), t], axis=1)
+
+
+def test_the_bound_is_the_inverse_of_the_information_whatever_the_units():
+    x = regressors(60)
+    units = np.array([1e-6, 1.0, 1e4, 1e9])
+    expected = np.linalg.inv(x.T @ x) / np.outer(units, units)
+    np.testing.assert_allclose(cramer_rao(x * units), expected, rtol=1e-9)
+
+
+def test_with_white_noise_the_coloured_covariance_is_the_bound():
+    x = regressors(60)[:, None, :]
+    bound = cramer_rao(x[:, 0])
+    np.testing.assert_allclose(coloured_covariance(x, bound, [0.0]), bound, rtol=1e-10)
+
+
+def test_the_neighbour_test_cries_wolf_as_often_as_it_says():
+    n = 54
+    x = regressors(n)
+    bound = cramer_rao(x)
+    rng = np.random.default_rng(1)
+    noise = rng.standard_normal((2000, n))
+    residuals = noise - noise @ x @ bound @ x.T
+    results = [neighbour_test("y", row, x, bound) for row in residuals]
+    rate = np.mean([result.probability < 0.05 for result in results])
+    assert 0.03 < rate < 0.07
+    # the correlation that the fit itself makes is taken out
+    assert np.mean([result.neighbours for result in results]) == pytest.approx(0.0, abs=0.01)
+
+
+def test_errors_corrected_for_colour_match_the_scatter_where_the_bound_does_not():
+    n, rho, sigma = 400, 0.9, 0.3
+    x = regressors(n)
+    rng = np.random.default_rng(2)
+    noise = sigma * first_order_noise(rng, rho, (200, n))
+    estimates = noise @ x @ np.linalg.inv(x.T @ x)
+    scatter = estimates.std(axis=0)
+    stated, bounds = [], []
+    for row, estimate in zip(noise, estimates, strict=True):
+        residuals = (row - x @ estimate)[:, None]
+        accuracy = assess(
+            ("a", "b", "c", "d"), estimate, 2, ("y",), residuals, x[:, None, :], np.array([residuals.std()])
+        )
+        assert not accuracy.white
+        stated.append(accuracy.standard_errors)
+        bounds.append(np.sqrt(np.diag(accuracy.bound)))
+    # the scatter of 200 numbers is known to 5%
+    np.testing.assert_allclose(np.mean(stated, axis=0), scatter, rtol=0.15)
+    assert np.all(np.mean(bounds, axis=0)[2:] < 0.3 * scatter[2:])
+
+
+def test_derivatives_that_only_act_as_a_sum_are_named_with_their_sum():
+    rng = np.random.default_rng(3)
+    wave = rng.standard_normal((50, 2))
+    x = np.stack([wave[:, 0], wave[:, 0] + 1e-4 * wave[:, 1], rng.standard_normal(50)], axis=1)
+    (finding,) = undetermined(("Cm_q", "Cm_alphadot", "CA_0"), np.array([-300.0, -60.0, 0.5]), cramer_rao(x / 0.01))
+    assert "cannot separate" in finding
+    assert "Cm_q" in finding
+    assert "Cm_alphadot" in finding
+    assert "identify the sum" in finding
+    assert "CA_0" not in finding
+
+
+def test_a_derivative_lost_in_its_error_is_named_and_a_good_one_is_not():
+    covariance = np.diag([4.0, 1e-4])
+    (finding,) = undetermined(("CN_alpha", "CA_0"), np.array([3.0, 0.5]), covariance)
+    assert finding.startswith("the record hardly determines CN_alpha")
+    assert undetermined(("CN_alpha", "CA_0"), np.array([12.0, 0.5]), covariance) == ()
