@@ -8,7 +8,6 @@ from scipy.stats import chi2
 from flightsim.support import FINNER, derivative_model, first_order_lag
 from identification.support import MODEL, TRUTH, flight, fly_range, output_model, truth
 from indicial.errors import DivergenceError, InputError
-from indicial.flightsim import DerivativeAerodynamics
 from indicial.identification import (
     FREE_FLIGHT,
     Precision,
@@ -209,4 +208,3 @@ def test_the_result_speaks_for_itself():
     plt.close(figure)
     with pytest.raises(InputError, match="Cl_p was not identified"):
         result["Cl_p"]
-    assert isinstance(MODEL, DerivativeAerodynamics)
