@@ -15,6 +15,10 @@ from indicial.errors import InputError
 Index = NDArray[np.int32]
 
 SLIP_WALL, FARFIELD, OUTFLOW, SYMMETRY = range(4)
+MOST_SKEWED = 1.0
+"""Distance of a face's centre off the line of its cells' centres, over their distance, beyond which both cells carry
+no gradient: their scheme is of first order. Only the slivers round a sharp nose tip are so skewed."""
+
 KINDS = {"wall": SLIP_WALL, "farfield": FARFIELD, "outflow": OUTFLOW, "symmetry": SYMMETRY}
 
 
@@ -100,7 +104,14 @@ class Grid:
         sign = np.concatenate([np.ones(mesh.n_faces), -np.ones(ni)])[order].astype(np.int8)
         other = np.concatenate([neighbour, np.full(mesh.n_faces - ni, -1), owner[:ni]])[order]
         centres = mesh.cell_centre / c
-        h = np.linalg.norm(centres[neighbour] - centres[owner[:ni]], axis=1)
+        weights = least_squares_weights(owner[:ni], neighbour, centres, offsets, other)
+        to_owner = mesh.face_centre / c - centres[owner]
+        step = centres[neighbour] - centres[owner[:ni]]
+        h = np.linalg.norm(step, axis=1)
+        skewed = _skewness(to_owner[:ni], step) > MOST_SKEWED
+        plain = np.zeros(mesh.n_cells, dtype=bool)
+        plain[owner[:ni][skewed]] = plain[neighbour[skewed]] = True
+        weights[np.repeat(plain, np.diff(offsets))] = 0.0
         walls = [np.arange(p.start, p.stop) for p in mesh.patches if p.kind == "wall"]
         return cls(
             owner=owner.astype(np.int32),
@@ -109,14 +120,22 @@ class Grid:
             normal=mesh.face_area / area[:, None],
             area=area / c**2,
             moment=(mesh.face_moment - np.cross(origin, mesh.face_area)) / c**3,
-            to_owner=mesh.face_centre / c - centres[owner],
+            to_owner=to_owner,
             to_neighbour=mesh.face_centre[:ni] / c - centres[neighbour],
             volume=mesh.cell_volume / c**3,
             offsets=offsets.astype(np.int32),
             faces=face.astype(np.int32),
             signs=sign,
             cells=other.astype(np.int32),
-            weights=least_squares_weights(owner[:ni], neighbour, centres, offsets, other),
+            weights=weights,
             softening=h**3,
             wall_faces=np.concatenate(walls).astype(np.int32) if walls else np.empty(0, dtype=np.int32),
         )
+
+
+def _skewness(to_face: Array, step: Array) -> Array:
+    """Distance of face centres off the line of centres, in lengths of that line."""
+    square = np.sum(step * step, axis=1)
+    along = np.sum(to_face * step, axis=1) / square
+    off: Array = np.linalg.norm(to_face - along[:, None] * step, axis=1) / np.sqrt(square)
+    return off
