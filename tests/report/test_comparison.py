@@ -42,8 +42,8 @@ def test_forced_oscillation_is_compared_by_its_fourier_reduction():
 def test_statement_is_made_from_the_numbers():
     said = statement(comparison(TABLE), "a mesh of 10 cells")
     assert "On a mesh of 10 cells" in said
-    assert "Cm_alpha +10% (by mrf, 2.0 standard errors)" in said
-    assert "Cm_q+Cm_alphadot -25% (by fom, 3.0 standard errors)" in said
+    assert "Cm_alpha +10% (by MRF, 2.0 standard errors)" in said
+    assert "Cm_q+Cm_alphadot -25% (by FOM, 3.0 standard errors)" in said
     assert "CN_q" not in said
     assert "no computed derivative" in statement(comparison(TABLE.select(method="mrf")), "it")
 

@@ -168,7 +168,7 @@ class IndicialResponse(Section):
 class Rom(Section):
     """The state-space model identified from the step responses."""
 
-    order: Annotated[int, Field(ge=1, le=30, description="largest number of states")] = 6
+    order: Annotated[int, Field(ge=1, le=30, description="largest number of states for each input")] = 6
 
 
 class Vehicle(Section):

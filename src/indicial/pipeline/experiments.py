@@ -147,6 +147,8 @@ class ExperimentPool:
         self._folder = folder
         self._watch = watch
         self._lock = threading.Lock()
+        for unfinished in folder.glob(".*"):
+            unfinished.unlink()  # files that a run was writing when it was ended
         self._futures: dict[str, Future[None]] = {}
         # Each worker gets its share of the cores; numba and BLAS read this when the worker imports them.
         share = str(max(1, (os.cpu_count() or 1) // workers))
@@ -264,8 +266,17 @@ def _start_worker(factory: SolverFactory, queue: Any) -> None:
 
     # Ctrl-C is the parent's to handle: it ends the workers.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     global _worker
     _worker = _Worker(factory, queue)
+
+
+def _end_with_parent() -> None:
+    """A parent that was killed cannot end its workers: they see to it themselves."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _perform(experiment: Experiment, path: Path) -> None:

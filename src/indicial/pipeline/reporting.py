@@ -74,8 +74,13 @@ def _comparison(context: Context, results: dict[str, Any], rows: list[Comparison
     return Chapter(
         "Comparison",
         [
-            "Per radian; rates made dimensionless as q d/2V. The number after ± is one standard error; below it the "
-            "difference from the value measured in free flight (negative: too small in size). MRF: steady states in a "
+            "Per radian; rates made dimensionless as q d/2V. Below each value its difference from the one measured in "
+            "free flight (negative: too small in size).",
+            "The number after ± is about one standard deviation of what each method knows of its own error: MRF the "
+            "change at a second amplitude; FOM scatter and drift from period to period; IRM the opposite step, the "
+            "tail and the quadrature; identified the standard error; free flight the printed error and interpolation over "
+            "Mach number. It does not hold the error of the mesh.",
+            "MRF: steady states in a "
             f"moving frame; FOM: forced oscillation at k = {results['case']['forced_oscillation']['k']:g}; IRM: "
             "response to steps; model: the state-space model made of those responses, at k = 0; identified: from the "
             "simulated range record of the flight that was flown with that model.",
@@ -146,7 +151,10 @@ def _moving_frame(context: Context, results: dict[str, Any], rows: list[Comparis
     ]
     if not residuals:
         return Chapter("Moving frame", text)
-    caption = "How the steady states converged; all but the first start from a nearby one."
+    caption = (
+        "How the steady states converged. The one at rest goes through the first-order scheme first, and jumps where "
+        "the second-order one takes over; the others start from it."
+    )
     return Chapter(
         "Moving frame",
         text,
@@ -240,7 +248,12 @@ def _flights(context: Context, results: dict[str, Any], rows: list[ComparisonRow
         "Damping of the angular motion",
     )
     pictures = [
-        _picture(context, "flight", lambda: flight_figure(flights), "The same flight with both models."),
+        _picture(
+            context,
+            "flight",
+            lambda: flight_figure(flights),
+            "The same flight with both models. Angles are those of body axes, which roll with the missile.",
+        ),
         _picture(
             context,
             "flight_difference",
@@ -250,7 +263,13 @@ def _flights(context: Context, results: dict[str, Any], rows: list[ComparisonRow
         _picture(context, "angles", lambda: angle_figure(flights), "Angular motion."),
         _picture(context, "damping", lambda: damping_figure(damping), "Damping, three ways."),
     ]
-    return Chapter("Flight", [results["flight"]["comparison"]["summary"]], [grid], pictures)
+    difference = results["flight"]["comparison"]
+    x, y, z = (1e3 * rms for rms in difference["rms_position_m"])
+    text = (
+        f"The two flights differ by {difference['rms_incidence_deg']:.2g} degrees in incidence and by {x:.2g}, "
+        f"{y:.2g} and {z:.2g} mm in position (rms, downrange, right and down, at the same instant)."
+    )
+    return Chapter("Flight", [text], [grid], pictures)
 
 
 def _identification(context: Context, results: dict[str, Any], rows: list[ComparisonRow]) -> Chapter:

@@ -115,7 +115,7 @@ def statement(rows: Sequence[ComparisonRow], mesh: str) -> str:
         sigma = ""
         if measured.uncertainty:
             sigma = f", {abs(row.records[method].value - measured.value) / measured.uncertainty:.1f} standard errors"
-        parts.append(f"{row.name} {worst:+.0%} (by {method}{sigma})")
+        parts.append(f"{row.name} {worst:+.0%} (by {method.upper()}{sigma})")
     if not parts:
         return f"On {mesh} no computed derivative has a measured value to be compared with."
     note = ""

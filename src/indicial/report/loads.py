@@ -124,7 +124,8 @@ def prediction_figure(checks: Mapping[str, tuple[History, Mapping[str, Array]]])
     checks : mapping
         By title: the CFD history, and by model the predicted coefficients, shape (n, 6).
     """
-    colours = (VERMILION, GREEN, PURPLE)
+    # The models lie on top of one another: a broad light line under a thin dashed one shows both.
+    lines = ((SKY, "-", 3.0), (VERMILION, "--", 1.2), (GREEN, ":", 1.2))
     with figure_style() as plt:
         figure: Figure
         figure, panels = plt.subplots(2, len(checks), figsize=(4.8 * len(checks), 6.2), squeeze=False, sharex="col")
@@ -132,8 +133,8 @@ def prediction_figure(checks: Mapping[str, tuple[History, Mapping[str, Array]]])
             for row, name in enumerate(PAIR):
                 axes, index = panels[row, column], COEFFICIENTS.index(name)
                 axes.plot(history.s, history[name], ".", color=BLACK, ms=3, label="CFD")
-                for colour, (model, values) in zip(colours, models.items(), strict=False):
-                    axes.plot(history.s, values[:, index], color=colour, lw=1.2, label=model)
+                for (colour, line, width), (model, values) in zip(lines, models.items(), strict=False):
+                    axes.plot(history.s, values[:, index], line, color=colour, lw=width, label=model)
                 axes.set_ylabel(symbol(name))
             panels[0, column].set_title(title)
             panels[1, column].set_xlabel("reduced time s = 2Vt/d")

@@ -142,7 +142,8 @@ def flow_figure(picture: FlowPicture, diameter: float) -> Figure:
         plane = _draw(above, picture.plane_corners[..., [0, 2]] / diameter, picture.plane_mach, cmap="viridis")
         figure.colorbar(plane, ax=above, label="Mach number relative to the body", shrink=0.9)
         above.set(xlabel="x/d, aft of the nose", ylabel="z/d", aspect="equal")
-        above.set(xlim=(-0.7, 10.0 * 1.01), ylim=(-4.0, 4.0))
+        height = 0.4 * float(picture.plane_corners[..., 0].max()) / diameter
+        above.set(ylim=(-height, height))
         above.set_title(f"{picture.title}: symmetry plane")
         limit = float(np.quantile(np.abs(picture.wall_cp), 0.98))
         wall = _surface(below, picture.wall_corners / diameter, picture.wall_cp, cmap="RdBu_r", limit=limit)
