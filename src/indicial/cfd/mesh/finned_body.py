@@ -2,9 +2,9 @@ r"""A structured mesh wrapped round a finned body in a supersonic stream.
 
 One block of planes along x, radial levels and azimuthal columns. It begins in the plane of the nose's tip: the stream
 ahead of an attached bow shock is undisturbed, and wedge-shaped cells round the axis would only be in the way (least
-squares gradients are unstable on them). A fin is a column of nodes split into two sheets, one for each of its faces. Above the tip the sheets close
-over a few levels, and the gap between them is one column of cells standing on the flat tip, the last of them
-prisms. So the flat faces, the tip and the thickness of the fins are exact.
+squares gradients are unstable on them). A fin is a column of nodes split into two sheets, one for each of its faces.
+Above the tip the sheets close over a few levels, and the gap between them is one column of cells standing on the flat
+tip, the last of them prisms. So the flat faces, the tip and the thickness of the fins are exact.
 """
 
 from __future__ import annotations
