@@ -78,8 +78,8 @@ def _comparison(context: Context, results: dict[str, Any], rows: list[Comparison
             "free flight (negative: too small in size).",
             "The number after ± is about one standard deviation of what each method knows of its own error: MRF the "
             "change at a second amplitude; FOM scatter and drift from period to period; IRM the opposite step, the "
-            "tail and the quadrature; identified the standard error; free flight the printed error and interpolation over "
-            "Mach number. It does not hold the error of the mesh.",
+            "tail and the quadrature; identified the standard error; free flight the printed error and interpolation "
+            "over Mach number. It does not hold the error of the mesh.",
             "MRF: steady states in a "
             f"moving frame; FOM: forced oscillation at k = {results['case']['forced_oscillation']['k']:g}; IRM: "
             "response to steps; model: the state-space model made of those responses, at k = 0; identified: from the "
