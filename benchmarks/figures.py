@@ -1,0 +1,35 @@
+"""What a benchmark reports, and how it times."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One measured number; `holds` tells whether it meets `target`, and is None where there is none."""
+
+    name: str
+    value: float
+    unit: str
+    target: str | None = None
+    holds: bool | None = None
+
+    def line(self) -> str:
+        """The figure for a reader."""
+        verdict = "" if self.holds is None else ("  holds" if self.holds else "  FALLS SHORT")
+        wanted = "" if self.target is None else f"  (asked: {self.target})"
+        return f"{self.name:<52}{self.value:>10.3g} {self.unit}{wanted}{verdict}"
+
+
+def best_time(action: Callable[[], object], repeats: int = 7) -> float:
+    """Least of several timings [s], after one run that is not timed: what the machine can do when left alone."""
+    action()
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        action()
+        times.append(time.perf_counter() - start)
+    return min(times)
