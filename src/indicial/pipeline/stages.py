@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
+from threadpoolctl import threadpool_limits
+
 from indicial.case import Case
 from indicial.errors import InputError
 from indicial.pipeline.context import Context, FactoryMaker, Outcome
@@ -123,7 +125,9 @@ def run_stages(
         elif name not in methods:
             perform = _load(STAGES[name].performer)
             folder.forget(name)
-            outcome, seconds = _timed(reporter, STAGES[name].title, lambda p=perform: p(context))  # type: ignore[misc]
+            # Matrices are small here: threads of BLAS would only wait for one another.
+            with threadpool_limits(limits=1, user_api="blas"):
+                outcome, seconds = _timed(reporter, STAGES[name].title, lambda p=perform: p(context))  # type: ignore[misc]
             folder.write(name, stage_key(case, name), seconds, outcome.results)
         elif name == methods[0]:
             _derive(context, methods)
