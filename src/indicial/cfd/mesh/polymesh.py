@@ -6,11 +6,12 @@ from collections.abc import Iterable
 from itertools import pairwise
 from pathlib import Path
 
-from indicial.cfd.mesh.mesh import Mesh, PatchKind
+from indicial.cfd.mesh.mesh import Mesh
 from indicial.files import write_text
 
-_OPENFOAM_TYPE: dict[PatchKind, str] = {
+_OPENFOAM_TYPE: dict[str, str] = {
     "wall": "wall",
+    "no_slip_wall": "wall",
     "farfield": "patch",
     "outflow": "patch",
     "symmetry": "symmetry",
