@@ -17,6 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from indicial.errors import InputError
 
 Array = NDArray[np.float64]
+Index = NDArray[np.integer[Any]]
+"""Indices into arrays, of any integer width."""
 
 COEFFICIENTS = ("CA", "CY", "CN", "Cl", "Cm", "Cn")
 """The six load coefficients: ``CA = -CX``, ``CN = -CZ``, Cl right wing down, Cm nose up, Cn nose right."""

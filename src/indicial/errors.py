@@ -10,7 +10,24 @@ class InputError(IndicialError, ValueError):
 
 
 class DivergenceError(IndicialError, RuntimeError):
-    """A solver failed: the message says where, when and what to try."""
+    """A solver failed: the message says where, when and what to try.
+
+    Parameters
+    ----------
+    message : str
+    cell : int, optional
+        The mesh cell in which it is worst.
+    time : float, optional
+        When, in the solver's units.
+    state : optional
+        The last good flow state, for whoever can keep it.
+    """
+
+    def __init__(self, message: str, *, cell: int | None = None, time: float = 0.0, state: object = None) -> None:
+        super().__init__(message)
+        self.cell = cell
+        self.time = time
+        self.state = state
 
 
 class NoLimitError(IndicialError, ValueError):

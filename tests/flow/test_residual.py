@@ -28,7 +28,9 @@ def skewed() -> Mesh:
 
 @pytest.mark.parametrize("second_order", [True, False])
 @pytest.mark.parametrize("seed", range(3))
-def test_still_air_stays_still_to_round_off_under_any_motion_on_a_skewed_mesh(skewed: Mesh, seed: int, second_order: bool) -> None:
+def test_still_air_stays_still_to_round_off_under_any_motion_on_a_skewed_mesh(
+    skewed: Mesh, seed: int, second_order: bool
+) -> None:
     grid = Grid.from_mesh(skewed, REFERENCE)
     rng = np.random.default_rng(seed)
     motion = MeshMotion(3.0 * rng.standard_normal(3), 3.0 * rng.standard_normal(3))

@@ -40,7 +40,13 @@ def centre_at(time: float, start: np.ndarray) -> np.ndarray:
 
 def error(n: int) -> float:
     """Volume-weighted L1 error of all variables at the end, skewed mesh, step in proportion to the spacing."""
-    mesh = box_mesh((n, 1, n), lower=(0.0, 0.0, 0.0), upper=(1.0, 1.0, 1.0), kinds={"y_min": "symmetry", "y_max": "symmetry"}, skew="smooth")
+    mesh = box_mesh(
+        (n, 1, n),
+        lower=(0.0, 0.0, 0.0),
+        upper=(1.0, 1.0, 1.0),
+        kinds={"y_min": "symmetry", "y_max": "symmetry"},
+        skew="smooth",
+    )
     grid = Grid.from_mesh(mesh, ReferenceQuantities(1.0, 1.0, PIVOT))
     start = np.array([0.4, 0.0, 0.55])
     steady = MeshMotion(VELOCITY, OMEGA)

@@ -131,7 +131,7 @@ class MovingFrame(Section):
     roll_rate: Annotated[SmallRate, Field(description="p c/2V of the whole model")] = 0.005
     second_factor: Annotated[
         float,
-        Field(gt=1.0, le=4.0, description="second amplitude of alpha and q, relative to the first: shows linearity"),
+        Field(gt=1.0, le=4.0, description="second amplitude of every rate, relative to the first: shows linearity"),
     ] = 2.0
 
 
@@ -140,6 +140,10 @@ class ForcedOscillation(Section):
 
     k: Annotated[float, Field(gt=0.0, le=2.0, description="reduced frequency omega c/2V")] = 0.1
     amplitude_deg: Annotated[SmallAngle, Field(description="amplitude in alpha")] = 0.25
+    second_factor: Annotated[
+        float,
+        Field(gt=1.0, le=4.0, description="second amplitude in pitch, relative to the first: shows linearity"),
+    ] = 2.0
     steps_per_period: Annotated[int, Field(ge=16, le=10000, multiple_of=2, description="time steps in a period")] = 48
     periods: Annotated[
         int, Field(ge=2, le=50, description="whole periods; the first is left to the start and not read")

@@ -10,7 +10,7 @@ from indicial.cfd.flow.gas import GAMMA, P
 from indicial.cfd.flow.grid import Grid
 from indicial.cfd.march.steady import SteadyState
 from indicial.cfd.mesh import Mesh
-from indicial.conventions import Array, ReferenceQuantities
+from indicial.conventions import Array, Index, ReferenceQuantities
 from indicial.motion import FlightCondition
 
 
@@ -40,7 +40,7 @@ class FlowField:
     pressure: Array
     velocity: Array
     mach: Array
-    wall_faces: Array
+    wall_faces: Index
     wall_cp: Array
 
     @classmethod

@@ -21,7 +21,7 @@ from indicial.cfd.march.steady import Progress, SteadyState, converge
 from indicial.cfd.march.unsteady import march
 from indicial.cfd.mesh import Mesh
 from indicial.conventions import Array, ReferenceQuantities, mesh_from_body
-from indicial.errors import InputError
+from indicial.errors import DivergenceError, InputError
 from indicial.history import History
 from indicial.motion import FlightCondition, Motion, Rates, SteadyMotion
 from indicial.solver import SteadyLoads
@@ -152,17 +152,20 @@ class FiniteVolumeSolver:
         if self._folder is not None:
             key = self._key(condition, velocity, rate, t, self.settings.unsteady_tolerance)
             checkpoint = Checkpoint(self._folder / f"march-{key}.npz", key)
-        result = march(
-            self._residual,
-            self._pattern,
-            start.q,
-            motion_at,
-            t * unit,
-            tolerance=self.settings.unsteady_tolerance,
-            checkpoint=checkpoint,
-            progress=self._progress,
-            ambient_pressure=AMBIENT_PRESSURE,
-        )
+        try:
+            result = march(
+                self._residual,
+                self._pattern,
+                start.q,
+                motion_at,
+                t * unit,
+                tolerance=self.settings.unsteady_tolerance,
+                checkpoint=checkpoint,
+                progress=self._progress,
+                ambient_pressure=AMBIENT_PRESSURE,
+            )
+        except DivergenceError as error:
+            raise DivergenceError(f"{error}; {self._place(error)}, t = {error.time / unit:.4g} s") from error
         return History(
             time=t,
             coefficients=self._coefficients(result.forces, result.moments, condition),
@@ -221,19 +224,36 @@ class FiniteVolumeSolver:
             if checkpoint is not None:
                 found = SteadyState(checkpoint["q"], motion, checkpoint["residuals"], int(checkpoint["products"]))
             else:
-                found = converge(
-                    self._residual,
-                    self._pattern,
-                    motion,
-                    self._nearest(motion),
-                    tolerance=self.settings.steady_tolerance,
-                    iterations=self.settings.steady_iterations,
-                    progress=self._progress,
-                )
+                found = self._converged(motion, key)
                 if stored is not None:
                     stored.save(q=found.q, residuals=found.residuals, products=np.array(found.products))
             self._states[key] = found
         return self._states[key]
+
+    def _converged(self, motion: MeshMotion, key: str) -> SteadyState:
+        """Compute a steady state; one that fails leaves its last good state in the folder."""
+        try:
+            return converge(
+                self._residual,
+                self._pattern,
+                motion,
+                self._nearest(motion),
+                tolerance=self.settings.steady_tolerance,
+                iterations=self.settings.steady_iterations,
+                progress=self._progress,
+            )
+        except DivergenceError as error:
+            kept = ""
+            if self._folder is not None and error.state is not None:
+                path = self._folder / f"diverged-{key}.npz"
+                Checkpoint(path, key).save(q=np.asarray(error.state))
+                kept = f"; the last good state is in {path}"
+            raise DivergenceError(f"{error}; {self._place(error)}{kept}") from error
+
+    def _place(self, error: DivergenceError) -> str:
+        """Where it went wrong, in mesh coordinates."""
+        x, y, z = self.mesh.cell_centre[error.cell or 0]
+        return f"worst at x = {x:.4g}, y = {y:.4g}, z = {z:.4g} m"
 
     def _stored(self, key: str) -> Checkpoint | None:
         return None if self._folder is None else Checkpoint(self._folder / f"steady-{key}.npz", key)

@@ -37,7 +37,7 @@ def compare(context: Context) -> Outcome:
         "versions": _versions(),
         "mesh": _plain(records["mesh"]),
         "timings_s": {stage: record["seconds"] for stage, record in records.items()},
-        "linearity": records["mrf"]["linearity"] + records["irm"]["linearity"],
+        "linearity": [entry for method in ("mrf", "fom", "irm") for entry in records[method]["linearity"]],
         "agreement": agreement,
         "rom": _plain(records["rom"]),
         "flight": _plain(records["fly"]),

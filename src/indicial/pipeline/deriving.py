@@ -63,11 +63,11 @@ def derive(context: Context, methods: Iterable[str]) -> dict[str, Outcome]:
 
 def _expected(context: Context, methods: tuple[str, ...]) -> float:
     steps = _weights(context)
-    steady = {"mrf": 10, "fom": 1, "irm": 4}
+    steady = {"mrf": 11, "fom": 1, "irm": 5}
     unsteady = {
         "mrf": 0.0,
-        "fom": steps["pitch oscillation"] + steps["plunge oscillation"],
-        "irm": 2.0 * steps["alpha step"] + steps["pitch rate step"],
+        "fom": 2.0 * steps["pitch oscillation"] + steps["plunge oscillation"],
+        "irm": 2.0 * steps["alpha step"] + 2.0 * steps["pitch rate step"],
     }
     return sum(_STEADY_COST * steady[m] + unsteady[m] for m in methods)
 
@@ -94,7 +94,7 @@ def _rolling(context: Context) -> tuple[moving_frame.Experiment, ...]:
         case.reference_quantities,
         ("p",),
         amplitudes={"p": case.moving_frame.roll_rate},
-        second=None,
+        second=case.moving_frame.second_factor,
         one_sided=True,
     )
 
@@ -115,8 +115,9 @@ def _moving_frame(context: Context, pool: ExperimentPool, threads: ThreadPoolExe
     table = pitch.derivatives() + roll.derivatives().select(name="Cl_p")
     linearity = [
         {"method": "mrf", "name": name, "what": f"amplitude times {settings.second_factor:g}", "change": change}
-        for name in pitch.changes
-        if name.startswith(("CN", "Cm")) and (change := pitch.linearity(name)) is not None
+        for result in (pitch, roll)
+        for name in result.changes
+        if name.startswith(("CN", "Cm", "Cl_p")) and (change := result.linearity(name)) is not None
     ]
     return Outcome(
         {"derivatives": table.to_records(), "linearity": linearity, "convergence": pitch.convergence},
@@ -127,18 +128,19 @@ def _moving_frame(context: Context, pool: ExperimentPool, threads: ThreadPoolExe
 def _forced_oscillation(context: Context, pool: ExperimentPool, threads: ThreadPoolExecutor) -> Outcome:
     case, settings = context.case, context.case.forced_oscillation
 
-    def oscillate(motion: forced_oscillation.OscillationMotion) -> Callable[[], History]:
+    def oscillate(motion: forced_oscillation.OscillationMotion, factor: float = 1.0) -> Callable[[], History]:
         return lambda: forced_oscillation.run(
             pool,
             case.flight_condition,
-            math.radians(settings.amplitude_deg),
+            math.radians(factor * settings.amplitude_deg),
             settings.k,
             motion,
             periods=settings.periods,
             steps_per_period=settings.steps_per_period,
         )
 
-    histories = _all(threads, {"pitch": oscillate("pitch"), "plunge": oscillate("plunge")})
+    larger = oscillate("pitch", settings.second_factor)
+    histories = _all(threads, {"pitch": oscillate("pitch"), "plunge": oscillate("plunge"), "pitch_larger": larger})
     for motion, history in histories.items():
         history.to_netcdf(context.folder.histories / f"fom_{motion}.nc")
     reductions = (forced_oscillation.phase_angle, forced_oscillation.regression, forced_oscillation.fourier)
@@ -154,11 +156,21 @@ def _forced_oscillation(context: Context, pool: ExperimentPool, threads: ThreadP
         motion: {
             name: [reading.value(name, "in_phase"), reading.value(name)] for name in forced_oscillation.DERIVATIVES
         }
-        for motion, reading in ((m, forced_oscillation.fourier(h)) for m, h in histories.items())
+        for motion, reading in ((m, forced_oscillation.fourier(histories[m])) for m in ("pitch", "plunge"))
     }
+    doubled = forced_oscillation.fourier(histories["pitch_larger"])
+    linearity = [
+        {
+            "method": "fom",
+            "name": f"{name}_q+{name}_alphadot",
+            "what": f"amplitude times {settings.second_factor:g}",
+            "change": doubled.value(name) / last.value(name) - 1.0,
+        }
+        for name in forced_oscillation.DERIVATIVES
+    ]
     periodicity = None if last.periodicity is None else last.periodicity.tolist()
     return Outcome(
-        {"derivatives": records.to_records(), "ellipses": ellipses, "periodicity": periodicity},
+        {"derivatives": records.to_records(), "ellipses": ellipses, "periodicity": periodicity, "linearity": linearity},
         _values(records.select(reduction="fourier"), ("Cm_q+Cm_alphadot", "Cm_alphadot")),
     )
 
@@ -195,6 +207,7 @@ def _indicial_response(context: Context, pool: ExperimentPool, threads: ThreadPo
         "alpha_up": ("alpha", alpha),
         "alpha_down": ("alpha", -alpha),
         "q": ("q", settings.pitch_rate),
+        "q_down": ("q", -settings.pitch_rate),
     }
 
     def respond(kind: indicial_response.StepKind, size: float) -> Callable[[], indicial_response.StepResponse]:
@@ -210,17 +223,19 @@ def _indicial_response(context: Context, pool: ExperimentPool, threads: ThreadPo
     label = {step: name for name, step in steps.items()}
     responses = _all(threads, {name: respond(*step) for name, step in steps.items()})
     up, down = responses["alpha_up"], responses["alpha_down"]
-    result = indicial_response.derive(indicial_response.average(up, down), responses["q"], alpha_check=up)
-    changes = indicial_response.linearity(up, down)
+    faster, slower = responses["q"], responses["q_down"]
+    result = indicial_response.derive(
+        indicial_response.average(up, down), indicial_response.average(faster, slower), alpha_check=up, q_check=faster
+    )
     linearity = [
-        {"method": "irm", "name": f"{name}_alpha(s)", "what": "opposite step", "change": changes[name]}
-        for name in indicial_response.LOADS
+        {"method": "irm", "name": f"{name}_{cause}(s)", "what": "opposite step", "change": change}
+        for cause, pair in (("alpha", (up, down)), ("q", (faster, slower)))
+        for name, change in indicial_response.linearity(*pair).items()
+        if name in indicial_response.LOADS
     ]
     finals = {
-        kind: {name: responses[key].limit(name)[0] for name in indicial_response.LOADS}
-        for kind, key in (("alpha", "alpha_up"), ("q", "q"))
+        cause: {name: result.values[f"{name}_{cause}"] for name in indicial_response.LOADS} for cause in ("alpha", "q")
     }
-    finals["alpha"] = {name: result.values[f"{name}_alpha"] for name in indicial_response.LOADS}
     tails = {name: integral.reason for name, integral in result.integrals.items()}
     table = result.derivatives()
     return Outcome(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from indicial.conventions import Array
-from indicial.errors import NoLimitError
+from indicial.errors import InputError, NoLimitError
 from indicial.history import History
 from indicial.pipeline.context import Context, Outcome
 from indicial.rom import (
@@ -23,7 +23,7 @@ from indicial.rom import (
     realise,
 )
 
-STEPS = ("alpha_up", "alpha_down", "q")
+STEPS = ("alpha_up", "alpha_down", "q", "q_down")
 MOTIONS = ("pitch", "plunge")
 
 
@@ -44,7 +44,7 @@ def reduce(context: Context) -> Outcome:
     refused = ""
     try:
         models["deficiency, Eq. 16"] = QuasiSteadyModel.from_responses(responses)
-    except NoLimitError as error:
+    except (NoLimitError, InputError) as error:
         refused = str(error)
     checks = []
     for motion in MOTIONS:

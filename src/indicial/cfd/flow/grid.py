@@ -9,10 +9,8 @@ from numpy.typing import NDArray
 
 from indicial.cfd.flow.reconstruction import least_squares_weights
 from indicial.cfd.mesh import Mesh
-from indicial.conventions import Array, ReferenceQuantities
+from indicial.conventions import Array, Index, ReferenceQuantities
 from indicial.errors import InputError
-
-Index = NDArray[np.int32]
 
 SLIP_WALL, FARFIELD, OUTFLOW, SYMMETRY = range(4)
 MOST_SKEWED = 1.0
@@ -94,7 +92,9 @@ class Grid:
         kind = np.empty(mesh.n_faces - ni, dtype=np.int8)
         for patch in mesh.patches:
             if patch.kind not in KINDS:
-                raise InputError(f"patch {patch.name} is of kind {patch.kind!r}, must be one of {', '.join(KINDS)}")
+                raise InputError(
+                    f"patch {patch.name} is of kind {patch.kind!r}; the flow is inviscid, it knows {', '.join(KINDS)}"
+                )
             kind[patch.start - ni : patch.stop - ni] = KINDS[patch.kind]
 
         cell = np.concatenate([owner, neighbour])
@@ -104,7 +104,7 @@ class Grid:
         sign = np.concatenate([np.ones(mesh.n_faces), -np.ones(ni)])[order].astype(np.int8)
         other = np.concatenate([neighbour, np.full(mesh.n_faces - ni, -1), owner[:ni]])[order]
         centres = mesh.cell_centre / c
-        weights = least_squares_weights(owner[:ni], neighbour, centres, offsets, other)
+        weights = least_squares_weights(centres, offsets, other)
         to_owner = mesh.face_centre / c - centres[owner]
         step = centres[neighbour] - centres[owner[:ni]]
         h = np.linalg.norm(step, axis=1)

@@ -18,7 +18,7 @@ from numba import njit, prange
 from indicial.cfd.flow.flux import hllc
 from indicial.cfd.flow.reconstruction import limiter, saturate
 from indicial.cfd.flow.residual import MeshMotion, Residual, boundary_flux, gather, gradients
-from indicial.conventions import Array
+from indicial.conventions import Array, Index
 
 _H = 1e-40
 
@@ -44,9 +44,9 @@ def _linearise_side(q, g, c, other, k, rx, ry, rz, dx, dy, dz, eps, out):  # typ
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def _linearise_faces(
+def _linearise_faces(  # type: ignore[no-untyped-def]
     q, g, velocity, omega, owner, neighbour, kind, normal, area, moment, ri, rj, eps, far, dl, dr, lin
-):  # type: ignore[no-untyped-def]
+):
     """Flux derivatives dl, dr (nf, 5, 5), (ni, 5, 5) and reconstruction slopes lin (nf, 2, 5, 4)."""
     ni = neighbour.shape[0]
     for f in prange(owner.shape[0]):
@@ -219,7 +219,7 @@ class Jacobian:
             out += np.einsum("nij,nj->ni", self.source, x)
         return out
 
-    def compact_blocks(self, extra: Array, slots: Array, diagonal: Array, count: int) -> Array:
+    def compact_blocks(self, extra: Array, slots: Index, diagonal: Index, count: int) -> Array:
         """First-order blocks in the sparse pattern given by `slots` and `diagonal`, shape (count, 5, 5)."""
         g = self.grid
         out = np.empty((count, 5, 5))

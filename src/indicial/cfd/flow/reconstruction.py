@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from indicial.conventions import Array
+from indicial.conventions import Array, Index
 
 SATURATION = 0.8
 """beta: the largest part of its cell value by which density or pressure may change towards a face."""
@@ -30,13 +30,11 @@ UNRESOLVED = 0.03
 a gradient is taken; below it small differences would be blown up and the scheme is unstable."""
 
 
-def least_squares_weights(owner: Array, neighbour: Array, centres: Array, offsets: Array, cells: Array) -> Array:
+def least_squares_weights(centres: Array, offsets: Index, cells: Index) -> Array:
     """Weights w of ``grad q = sum_k w_k (q_k - q)`` over face neighbours, exact for linear fields.
 
     Parameters
     ----------
-    owner, neighbour : ndarray
-        Interior faces' cells.
     centres : ndarray
         Cell centres (nc, 3).
     offsets, cells : ndarray

@@ -44,7 +44,7 @@ class Checkpoint:
     def save(self, **arrays: Array) -> None:
         """Save now."""
         with atomic_path(self.path) as temporary, open(temporary, "wb") as file:
-            np.savez(file, key=np.array(self._key), **arrays)
+            np.savez(file, allow_pickle=False, key=np.array(self._key), **arrays)
         self._saved = time.monotonic()
 
     def save_if_due(self, **arrays: Array) -> None:

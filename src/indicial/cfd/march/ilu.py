@@ -12,8 +12,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from indicial.cfd.flow.grid import Grid, Index
-from indicial.conventions import Array
+from indicial.cfd.flow.grid import Grid
+from indicial.conventions import Array, Index
 
 
 @dataclass(frozen=True)

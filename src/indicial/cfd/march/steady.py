@@ -124,7 +124,7 @@ def _iterate(
     volume = residual.grid.volume
     r = residual(q, motion)
     norm = float(np.linalg.norm(r)) / scale
-    first, lowest_cfl, spent = max(norm, tolerance), cfl, 0
+    first, lowest_cfl, spent = max(norm, 10.0 * tolerance), cfl, 0
     norms.append(norm)
     while norm > tolerance and iterations > 0:
         iterations -= 1
@@ -161,7 +161,9 @@ def _iterate(
         worst = int(np.argmax(np.sum((r / volume[:, None]) ** 2, axis=1)))
         raise DivergenceError(
             f"the steady solution stopped at a residual of {norm:.1e} (wanted {tolerance:.1e}) after {len(norms)} "
-            f"iterations, worst in cell {worst}; try a finer or smoother mesh, or a start from a nearby condition"
+            "iterations; try a finer or smoother mesh, or a start from a nearby condition",
+            cell=worst,
+            state=q,
         )
     return q, spent
 

@@ -158,12 +158,12 @@ def march(
                 tolerance * scale,
             )
         except DivergenceError as error:
-            where = f"at t = {times[m]:.4g} c/a (step {m} of {n - 1})"
             saved = ""
             if checkpoint is not None:
                 checkpoint.save(**kept(m))
                 saved = f"; the last good state is in {checkpoint.path}"
-            raise DivergenceError(f"the unsteady march stopped {where}: {error}{saved}") from error
+            message = f"the unsteady march stopped at step {m} of {n - 1}: {error}{saved}"
+            raise DivergenceError(message, cell=error.cell, time=float(times[m])) from error
         before, q = q, new
         steps += used
         worst = max(worst, left / scale)
@@ -202,6 +202,7 @@ def _step(
         q, norm = q_new, norm_new
     worst = int(np.argmax(np.sum(r**2, axis=1)))
     raise DivergenceError(
-        f"residual {norm:.1e} of {target:.1e} after {_NEWTON_STEPS} Newton steps, worst in cell {worst}; "
-        "try a smaller amplitude or a smaller time step"
+        f"residual {norm:.1e} of {target:.1e} after {_NEWTON_STEPS} Newton steps; "
+        "try a smaller amplitude or a smaller time step",
+        cell=worst,
     )

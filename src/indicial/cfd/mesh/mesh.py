@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from indicial.cfd.mesh.hexahedra import PatchSides
     from indicial.cfd.mesh.quality import MeshReport
 
-PatchKind = Literal["wall", "farfield", "outflow", "symmetry"]
+PatchKind = Literal["wall", "no_slip_wall", "farfield", "outflow", "symmetry"]
 PATCH_KINDS: tuple[PatchKind, ...] = get_args(PatchKind)
 
 
