@@ -97,7 +97,7 @@ def damping_figure(damping: Mapping[str, Mapping[str, Any]]) -> Figure:
         axes.set_xticks(range(len(groups)), [f"{LABELS[name]},\n{arm['name']}" for name, arm in groups], fontsize=8)
         axes.axhline(0.0, color=BLACK, lw=0.8)
         axes.set_ylabel("damping [1/s] (negative: dies out)")
-        axes.legend(fontsize=8)
+        axes.legend(fontsize=8, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
         return figure
 
 

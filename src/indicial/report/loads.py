@@ -32,7 +32,7 @@ def convergence_figure(residuals: Mapping[str, Array]) -> Figure:
             axes.semilogy(np.arange(len(values)), values, marker=".", lw=1.0, label=label)
         axes.set_xlabel("Newton iteration")
         axes.set_ylabel("residual / residual of still air")
-        axes.set_title("Steady states: convergence")
+        axes.set_title("Steady states (from rest: first order, then, at the jump, second)")
         axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
         return figure
 
