@@ -150,12 +150,10 @@ class ExperimentPool:
         for unfinished in folder.glob(".*"):
             unfinished.unlink()  # files that a run was writing when it was ended
         self._futures: dict[str, Future[None]] = {}
-        # Each worker gets its share of the cores; numba and BLAS read this when the worker imports them.
-        share = str(max(1, (os.cpu_count() or 1) // workers))
-        os.environ.update(dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), share))
+        share = max(1, (os.cpu_count() or 1) // workers)
         context = multiprocessing.get_context("spawn")
         self._queue = context.Queue()
-        self._executor = ProcessPoolExecutor(workers, context, _start_worker, (factory, self._queue))
+        self._executor = ProcessPoolExecutor(workers, context, _start_worker, (factory, self._queue, share))
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
 
@@ -261,9 +259,15 @@ class _Worker:
 _worker: _Worker | None = None
 
 
-def _start_worker(factory: SolverFactory, queue: Any) -> None:
+def _start_worker(factory: SolverFactory, queue: Any, threads: int) -> None:
+    """Make the process a worker with its share of the cores."""
     import signal
 
+    import numba
+    import threadpoolctl
+
+    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
+    threadpoolctl.threadpool_limits(threads)
     # Ctrl-C is the parent's to handle: it ends the workers.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
