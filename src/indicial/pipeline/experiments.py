@@ -266,7 +266,7 @@ def _start_worker(factory: SolverFactory, queue: Any, threads: int) -> None:
     import numba
     import threadpoolctl
 
-    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
+    numba.set_num_threads(min(threads, numba.get_num_threads()))
     threadpoolctl.threadpool_limits(threads)
     # Ctrl-C is the parent's to handle: it ends the workers.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
