@@ -109,6 +109,15 @@ def test_damping_of_a_small_flight_is_that_of_its_linearisation(model: object, r
         assert abs(arm.closed_form_difference) < 1e-3
 
 
+def test_damping_of_a_stiff_flight_is_that_of_its_linearisation() -> None:
+    """A lag far faster than the motion, which CVODES flies."""
+    check = check_damping(FINNER, first_order_lag(3.0), SPEED, amplitude=math.radians(0.02), wavelengths=3.0)
+    assert check.trajectory.provenance["method"] == "cvodes"
+    for arm in check.arms:
+        assert arm.fitted.real == pytest.approx(arm.linearised.real, rel=2e-6)
+        assert arm.fitted.imag == pytest.approx(arm.linearised.imag, rel=2e-6)
+
+
 def test_fitted_damping_parts_from_the_linear_one_with_the_square_of_the_amplitude() -> None:
     differences = [
         check_damping(FINNER, derivative_model(), SPEED, amplitude=math.radians(a)).arms[0].fit_difference

@@ -33,7 +33,50 @@ def test_adaptive_flight_equals_the_march_with_lag_states() -> None:
     assert other.lag == pytest.approx(one.lag, abs=1e-8)
 
 
-@pytest.mark.parametrize("method", ["rk4", "dop853"])
+def test_stiff_flight_tends_to_the_march_with_tiny_steps_as_its_error_says() -> None:
+    """A lag three hundred times faster than the motion, over several blocks of instants, loads settling at first."""
+    dynamics = build_dynamics(FINNER, first_order_lag(3.0))
+    duration, step = 0.04, 2e-7
+    exact = fly(dynamics, START, duration, step=step, every=500, method="rk4", estimate_error=False)
+    flight = fly(dynamics, START, duration, step=step, every=500, method="cvodes")
+    assert len(flight) == 401
+    assert flight.time == pytest.approx(exact.time, abs=1e-15)
+    assert flight.velocity == pytest.approx(exact.velocity, abs=2e-7)
+    assert flight.rate == pytest.approx(exact.rate, abs=2e-8)
+    assert flight.quaternion == pytest.approx(exact.quaternion, abs=1e-10)
+    assert flight.lag == pytest.approx(exact.lag, abs=1e-10)
+    position = np.max(np.linalg.norm(flight.position - exact.position, axis=1))
+    assert 0.3 * position < flight.provenance["position_error_m"] < 3.0 * position < 1e-8
+    assert "tolerance" in flight.summary()
+
+
+def test_error_of_a_stiff_flight_falls_with_the_tolerance() -> None:
+    dynamics = build_dynamics(FINNER, first_order_lag(3.0))
+    start, spacing = dynamics.initial_vector(START), 1e-4
+    truth, *found = (
+        np.array(dynamics.stiff_march(100, tolerance)(start, [], spacing)) for tolerance in (1e-13, 1e-6, 1e-8, 1e-10)
+    )
+    errors = [np.max(np.abs(states - truth)[10:13]) for states in found]
+    assert errors[0] > 5.0 * errors[1] > 25.0 * errors[2]
+
+
+def test_only_lags_much_faster_than_the_motion_are_flown_as_stiff() -> None:
+    stiff, quasi = (simulate(FINNER, model, START, 0.05) for model in (first_order_lag(3.0), derivative_model()))
+    assert stiff.provenance["method"] == "cvodes"
+    assert quasi.provenance["method"] == "rk4"
+    # Runge-Kutta would need more steps than it may take.
+    fastest = simulate(FINNER, first_order_lag(1e5), START, 0.005, estimate_error=False)
+    assert fastest.provenance["method"] == "cvodes"
+    asked = simulate(FINNER, first_order_lag(3.0), START, 0.001, step=1e-6)
+    assert asked.provenance["method"] == "rk4"
+
+
+def test_a_stiff_flight_that_blows_up_is_an_error() -> None:
+    with pytest.raises(DivergenceError, match="CVODES"):
+        simulate(FINNER, derivative_model(Cl_p=3e4), START, 2.0, step=1e-3, method="cvodes")
+
+
+@pytest.mark.parametrize("method", ["rk4", "cvodes", "dop853"])
 def test_flight_ends_exactly_at_a_station(method: str) -> None:
     flight = simulate(FINNER, derivative_model(), START, 1.0, step=1e-3, end=End(x=50.0), method=method)
     assert flight.position[-1, 0] == pytest.approx(50.0, abs=1e-9)
@@ -64,7 +107,8 @@ def test_keeping_every_tenth_step_changes_no_number() -> None:
 
 
 def test_fast_lags_take_short_steps_but_keep_few_instants() -> None:
-    lagged, quasi = (simulate(FINNER, model, START, 0.05) for model in (first_order_lag(0.5), derivative_model()))
+    models = (first_order_lag(0.5), derivative_model())
+    lagged, quasi = (simulate(FINNER, model, START, 0.05, method="rk4") for model in models)
     assert lagged.provenance["step_s"] < 0.1 * quasi.provenance["step_s"]
     assert len(lagged) < 2 * len(quasi)
 

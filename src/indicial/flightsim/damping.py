@@ -32,7 +32,7 @@ from indicial.flightsim.earth import FlatEarth
 from indicial.flightsim.epicycle import EpicyclicFit, fit_trajectory, order_arms
 from indicial.flightsim.initial import InitialState
 from indicial.flightsim.modes import Modes, missile_modes
-from indicial.flightsim.simulate import fly, suggest_step
+from indicial.flightsim.simulate import fly, suggest_method, suggest_step
 from indicial.flightsim.trajectory import Trajectory
 from indicial.flightsim.vehicle import Vehicle
 
@@ -254,7 +254,8 @@ def check_damping(
     wavelengths : float
         Length of the flight, in turns of the slow arm (of the pitch frequency at zero roll).
     step : float, optional
-        [s]; half of what `fly` takes if not given, since Runge-Kutta steps damp by themselves a little.
+        Of Runge-Kutta [s]. If not given, the method is `fly`'s; Runge-Kutta then takes half of its step, since its
+        steps damp by themselves a little.
 
     Raises
     ------
@@ -278,11 +279,11 @@ def check_damping(
     decay = 2.0 * slowing / speed  # of V over distance: V = V0 exp(-decay s)
     duration = math.expm1(decay * distance) / (decay * speed) if decay else distance / speed
     initial = InitialState.from_path(speed, alpha=amplitude, rate=(roll_rate, 0.0, 0.0), position=(0.0, 0.0, -altitude))
-    every = None
+    every, method = None, None
     if step is None:
         step, kept = suggest_step(dynamics, dynamics.initial_vector(initial), np.zeros(0), duration)
-        step, every = 0.5 * step, 2 * kept
-    trajectory = fly(dynamics, initial, duration, step=step, every=every)
+        step, every, method = 0.5 * step, 2 * kept, suggest_method(kept)
+    trajectory = fly(dynamics, initial, duration, step=step, every=every, method=method)
     transient = max((10.0 / abs(mode.per_metre.real) for mode in modes.lag), default=0.0)
     fit = fit_trajectory(trajectory, trim=False, skip=min(transient, 0.25 * distance))
     arms = tuple(

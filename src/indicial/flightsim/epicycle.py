@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from threadpoolctl import threadpool_limits
 
 from indicial.conventions import Array
 from indicial.errors import InputError
@@ -21,8 +22,8 @@ from indicial.flightsim.trajectory import Trajectory
 
 Complex = NDArray[np.complex128]
 
-_SAMPLES = 600
-_PENCIL = 240
+_SAMPLES = 300  # of the start value, which takes a few a turn; the fit itself takes every one given
+_PENCIL = 120
 
 
 @dataclass(frozen=True)
@@ -163,7 +164,8 @@ def _matrix_pencil(samples: Complex, spacing: float, trim: bool) -> list[complex
     """Eigenvalues [1/m] of two exponentials (and a constant) in evenly spaced samples."""
     order = 3 if trim else 2
     hankel = np.lib.stride_tricks.sliding_window_view(samples, _PENCIL + 1)
-    _, _, right = np.linalg.svd(hankel, full_matrices=False)
+    with threadpool_limits(limits=1, user_api="blas"):  # small matrices: threads would only fight
+        _, _, right = np.linalg.svd(hankel, full_matrices=False)
     span = right[:order].T
     ratios = np.linalg.eigvals(np.linalg.lstsq(span[:-1], span[1:], rcond=None)[0])
     values = np.log(ratios) / spacing

@@ -1,12 +1,12 @@
-"""Flying a model: fixed-step Runge-Kutta inside CasADi, or an adaptive scheme as a cross-check."""
+"""Flying a model: Runge-Kutta or, for fast lag states, CVODES inside CasADi; or SciPy's as a cross-check."""
 
 from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,14 @@ from indicial.flightsim.vehicle import Vehicle
 
 log = logging.getLogger(__name__)
 
-Method = Literal["rk4", "dop853"]
+Method = Literal["rk4", "cvodes", "dop853"]
+
+TOLERANCE = 1e-11
+"""Relative tolerance of the adaptive methods."""
 
 _BLOCK = 2048  # steps marched at a time between looks at the end condition
+_STIFF_BLOCK = 128  # instants, likewise: far fewer, and nothing need be well behaved beyond the end
+_STIFF = 10  # steps an instant from which CVODES takes less time than Runge-Kutta
 _MAX_STEPS = 20_000_000
 
 
@@ -63,7 +68,7 @@ def simulate(
     step: float | None = None,
     every: int | None = None,
     end: End | None = None,
-    method: Method = "rk4",
+    method: Method | None = None,
     atmosphere: Atmosphere | None = None,
     earth: Earth | None = None,
     estimate_error: bool = True,
@@ -83,7 +88,7 @@ def fly(
     step: float | None = None,
     every: int | None = None,
     end: End | None = None,
-    method: Method = "rk4",
+    method: Method | None = None,
     parameters: Mapping[str, float] | None = None,
     estimate_error: bool = True,
 ) -> Trajectory:
@@ -96,19 +101,20 @@ def fly(
     duration : float
         [s]; the flight ends there at the latest.
     step : float, optional
-        Of "rk4" [s]. If not given, see `suggest_step`.
+        Of "rk4" [s]; the other methods choose their own. If not given, see `suggest_step`.
     every : int, optional
         Every how many steps an instant is kept; the first and last always are. 1 if `step` is given, else by
-        `suggest_step`.
+        `suggest_step`. The other methods keep instants as far apart ("cvodes" evenly spaced, no farther).
     end : End, optional
-    method : {"rk4", "dop853"}
-        Fixed-step Runge-Kutta of fourth order, marched inside CasADi; or SciPy's adaptive DOP853 at a tolerance
-        of 1e-11, much slower, as a second implementation.
+    method : {"rk4", "cvodes", "dop853"}, optional
+        Fixed-step Runge-Kutta of fourth order, marched inside CasADi; CVODES there, at a tolerance of `TOLERANCE`,
+        for lag states far faster than the motion; or SciPy's adaptive DOP853 at that tolerance, much slower, as a
+        second implementation. If not given, "rk4" if `step` is, else by `suggest_method`.
     parameters : mapping, optional
         Values of the model's free symbols.
     estimate_error : bool
-        Fly "rk4" again with half the step, and record the difference, (16/15) of which is the error of the flight
-        returned, in the provenance.
+        Fly again and record the error of the flight returned in the provenance: "rk4" with half the step, 16/15 of
+        the difference; "cvodes" with a hundredth of the tolerance, the difference.
 
     Raises
     ------
@@ -123,26 +129,36 @@ def fly(
     start = dynamics.initial_vector(initial, values)
     if step is None:
         step, kept = suggest_step(dynamics, start, values, duration)
+        method = suggest_method(kept) if method is None else method
     else:
         kept = 1
+        method = "rk4" if method is None else method
     every = kept if every is None else every
-    if not (math.isfinite(step) and 0.0 < step <= duration) or duration / step > _MAX_STEPS:
-        raise InputError(f"step is {step} s, must be at most the duration and no less than 1/{_MAX_STEPS} of it")
     if every < 1:
         raise InputError(f"every is {every}, must be at least 1 (every step is kept)")
+    if method != "rk4":
+        step, every = every * step, 1  # instants only
+    if not (math.isfinite(step) and 0.0 < step <= duration) or duration / step > _MAX_STEPS:
+        raise InputError(f"step is {step} s, must be at most the duration and no less than 1/{_MAX_STEPS} of it")
     end = End() if end is None else end
     if end.margins(dynamics, start[None, :]).min(initial=math.inf) <= 0.0:
         raise InputError("the flight starts beyond its end")
-    provenance: dict[str, Any] = {"method": method, "step_s": step, "every": every}
+    flight = _Flight(dynamics, start, values, duration, end)
+    provenance: dict[str, Any] = {"method": method, "tolerance": TOLERANCE}
     if method == "dop853":
-        time, states = _adaptive(dynamics, start, values, duration, every * step, end)
-    elif method == "rk4":
-        time, states = _fixed_step(dynamics, start, values, duration, step, every, end)
+        time, states = _adaptive(flight, step)
+    elif method == "cvodes":
+        time, states = _stiff(flight, step, TOLERANCE)
         if estimate_error:
-            finer = _fixed_step(dynamics, start, values, duration, step / 2.0, 2 * every, end)
-            provenance |= _difference(time, states, *finer)
+            provenance |= _difference(time, states, *_stiff(flight, step, 0.01 * TOLERANCE))
+    elif method == "rk4":
+        provenance = {"method": method, "step_s": step, "every": every}
+        time, states = _fixed_step(flight, step, every)
+        if estimate_error:
+            finer = _difference(time, states, *_fixed_step(flight, step / 2.0, 2 * every))
+            provenance |= {name: 16.0 / 15.0 * value for name, value in finer.items()}
     else:
-        raise InputError(f"method is {method!r}, must be 'rk4' or 'dop853'")
+        raise InputError(f"method is {method!r}, must be 'rk4', 'cvodes' or 'dop853'")
     return record(dynamics, time, states, values, provenance)
 
 
@@ -158,6 +174,11 @@ def suggest_step(dynamics: Dynamics, state: Array, parameters: Array, duration: 
     instants = math.ceil(max(10.0, duration * rigid / 0.1))
     steps = max(instants, math.ceil(duration * fastest / 0.5))
     return duration / steps, steps // instants
+
+
+def suggest_method(every: int) -> Method:
+    """CVODES where `suggest_step` takes many steps an instant, Runge-Kutta where the motion itself rules its step."""
+    return "cvodes" if every > _STIFF else "rk4"
 
 
 def record(dynamics: Dynamics, time: Array, states: Array, parameters: Array, provenance: dict[str, Any]) -> Trajectory:
@@ -202,31 +223,58 @@ def _outside(dynamics: Dynamics, trajectory: Trajectory, states: Array) -> NDArr
     return outside
 
 
-def _fixed_step(
-    dynamics: Dynamics, start: Array, parameters: Array, duration: float, step: float, every: int, end: End
+class _Flight(NamedTuple):
+    """What every method flies."""
+
+    dynamics: Dynamics
+    start: Array
+    parameters: Array
+    duration: float
+    end: End
+
+
+def _fixed_step(flight: _Flight, step: float, every: int) -> tuple[Array, Array]:
+    return _march(flight, flight.dynamics.march, _BLOCK, step, every, f": try a step below {step:.3g} s")
+
+
+def _stiff(flight: _Flight, spacing: float, tolerance: float) -> tuple[Array, Array]:
+    """Instants evenly spaced over the duration, at most `spacing` [s] apart."""
+    even = flight.duration / math.ceil(flight.duration / spacing * (1.0 - 1e-12))
+
+    def marches(instants: int) -> Any:
+        march = flight.dynamics.stiff_march(instants, tolerance)
+        return lambda state, parameters, lengths: march(state, parameters, lengths[0, 0])
+
+    remedy = f": CVODES gave up within the next {_STIFF_BLOCK * even:.3g} s"
+    return _march(flight, marches, _STIFF_BLOCK, even, 1, remedy)
+
+
+def _march(
+    flight: _Flight, marches: Callable[[int], Any], block: int, step: float, every: int, remedy: str
 ) -> tuple[Array, Array]:
     """Instants kept (n,) and states (n, nx), the first included; the last step is cut to meet the end exactly."""
+    dynamics, start, parameters, duration, end = flight
     lengths = _step_lengths(duration, step)
     time = np.append(step * np.arange(lengths.size), duration)
     kept, blocks, before = [0], [start[None, :]], start
-    for first in range(0, lengths.size, _BLOCK):
-        chosen = lengths[first : first + _BLOCK]
-        if first == 0 or chosen.size < _BLOCK:
-            march = dynamics.march(chosen.size)
-        states = np.array(march(before, parameters, chosen[None, :])).T
+    for first in range(0, lengths.size, block):
+        chosen = lengths[first : first + block]
+        if first == 0 or chosen.size < block:
+            march = marches(chosen.size)
+        states = _marched(march, before, parameters, chosen)
         passed = np.any(end.margins(dynamics, states) <= 0.0, axis=0)
         flown = int(np.argmax(passed)) if np.any(passed) else chosen.size
         good = np.all(np.isfinite(states[:flown]), axis=1)
         if not np.all(good):
             when = time[first + int(np.argmin(good))]
-            raise DivergenceError(f"flight is not finite after t = {when:.6g} s: try a step below {step:.3g} s")
+            raise DivergenceError(f"flight is not finite after t = {when:.6g} s{remedy}")
         index = first + 1 + np.arange(flown)
         wanted = (index % every == 0) | (index == lengths.size)
         kept += index[wanted].tolist()
         blocks.append(states[:flown][wanted])
         if flown < chosen.size:
             here = states[flown - 1] if flown else before
-            length, last = _last_step(dynamics, here, parameters, chosen[flown], end)
+            length, last = _last_step(flight, marches(1), here, chosen[flown])
             return np.append(time[kept], time[first + flown] + length), np.vstack([*blocks, last])
         before = states[-1]
     return time[kept], np.vstack(blocks)
@@ -239,26 +287,35 @@ def _step_lengths(duration: float, step: float) -> Array:
     return np.full(whole, step) if rest < 1e-9 * step else np.append(np.full(whole, step), rest)
 
 
-def _last_step(dynamics: Dynamics, state: Array, parameters: Array, step: float, end: End) -> tuple[float, Array]:
+def _last_step(flight: _Flight, one: Any, state: Array, step: float) -> tuple[float, Array]:
     """Length [s] of the step that meets the end, and the state there, shape (1, nx)."""
     from scipy.optimize import brentq
 
-    one = dynamics.step()
-
     def after(length: float) -> Array:
-        return np.array(one(state, parameters, length)).T
+        return _marched(one, state, flight.parameters, np.array([length]))
 
     def margin(length: float) -> float:
-        return float(end.margins(dynamics, after(length)).min())
+        return float(flight.end.margins(flight.dynamics, after(length)).min())
 
+    if margin(step) >= 0.0:  # it ends there, to round-off
+        return step, after(step)
     length = float(brentq(margin, 0.0, step, xtol=1e-14 * step, rtol=1e-14))
     return length, after(length)
 
 
-def _adaptive(
-    dynamics: Dynamics, start: Array, parameters: Array, duration: float, step: float, end: End
-) -> tuple[Array, Array]:
+def _marched(march: Any, state: Array, parameters: Array, lengths: Array) -> Array:
+    """States after each step, shape (n, nx); not a number if CVODES gave up."""
+    try:
+        return np.array(march(state, parameters, lengths[None, :])).T
+    except RuntimeError as error:
+        log.debug("march failed: %s", error)
+        return np.full((lengths.size, state.size), np.nan)
+
+
+def _adaptive(flight: _Flight, step: float) -> tuple[Array, Array]:
     from scipy.integrate import solve_ivp
+
+    dynamics, start, parameters, duration, end = flight
 
     def derivative(_: float, state: Array) -> Array:
         return np.array(dynamics.derivative(state, parameters)).ravel()
@@ -271,7 +328,14 @@ def _adaptive(
     times = np.append(np.arange(0.0, duration * (1.0 - 1e-12), step), duration)
     scale = np.maximum(np.abs(start), 1.0)
     result = solve_ivp(
-        derivative, (0.0, duration), start, "DOP853", times, rtol=1e-11, atol=1e-13 * scale, events=events
+        derivative,
+        (0.0, duration),
+        start,
+        "DOP853",
+        times,
+        rtol=TOLERANCE,
+        atol=0.01 * TOLERANCE * scale,
+        events=events,
     )
     if not result.success:
         raise DivergenceError(f"adaptive flight stopped at t = {result.t[-1]:.6g} s: {result.message}")
@@ -282,14 +346,11 @@ def _adaptive(
 
 
 def _difference(time: Array, states: Array, finer_time: Array, finer: Array) -> dict[str, float]:
-    """Error of `states`: 16/15 of the difference from a flight of half the step, at the instants of both."""
+    """Largest difference of position and attitude from a finer flight, at the instants of both."""
     n = min(len(time), len(finer_time))
     shared = np.isclose(time[:n], finer_time[:n], rtol=1e-12, atol=0.0)
     coarse, fine = states[:n][shared], finer[:n][shared]
     position = np.max(np.linalg.norm(coarse[:, POSITION] - fine[:, POSITION], axis=1))
     a, b = (y[:, QUATERNION] / np.linalg.norm(y[:, QUATERNION], axis=1, keepdims=True) for y in (coarse, fine))
     attitude = np.max(4.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(a - b, axis=1), 0.0, 1.0)))
-    return {
-        "position_error_m": float(position) * 16.0 / 15.0,
-        "attitude_error_rad": float(attitude) * 16.0 / 15.0,
-    }
+    return {"position_error_m": float(position), "attitude_error_rad": float(attitude)}

@@ -347,8 +347,13 @@ class Trajectory:
         ]
         made = self.provenance
         if "position_error_m" in made:
+            march = (
+                f"step {made['step_s']:.3g} s; error by halving it"
+                if "step_s" in made
+                else f"tolerance {made['tolerance']:.3g}; error by a hundredth of it"
+            )
             lines.append(
-                f"  {made['method']}, step {made['step_s']:.3g} s; error by halving it: "
+                f"  {made['method']}, {march}: "
                 f"position {made['position_error_m']:.2g} m, attitude {made['attitude_error_rad']:.2g} rad"
             )
         outside = int(np.count_nonzero(self.outside_range))

@@ -29,8 +29,6 @@ from indicial.pipeline.reducing import load_model
 
 FLIGHTS = ("derivatives", "rom")
 
-_KEPT = 3000  # instants of a flight that is kept
-
 _SOURCES = {"mrf": ("CA_0", "CN_alpha", "CN_q", "Cm_alpha", "Cm_q", "Cl_p"), "irm": ("CN_alphadot", "Cm_alphadot")}
 
 
@@ -120,9 +118,7 @@ def _fly(context: Context, body: Vehicle, model: SymmetricMissile) -> Trajectory
     )
     # Long enough for a missile that loses half of its speed; the flight ends at the range's.
     duration = 2.0 * flight.distance_m / condition.speed
-    flown = simulate(body, model, start, duration, end=End(x=flight.distance_m), atmosphere=atmosphere(context))
-    # A model with fast lag states is marched in steps far shorter than anything worth keeping.
-    return flown.at_times(np.linspace(0.0, flown.time[-1], _KEPT)) if len(flown) > _KEPT else flown
+    return simulate(body, model, start, duration, end=End(x=flight.distance_m), atmosphere=atmosphere(context))
 
 
 def _damping(context: Context, body: Vehicle, model: SymmetricMissile) -> DampingCheck:
