@@ -49,6 +49,7 @@ def _linearise_faces(  # type: ignore[no-untyped-def]
 ):
     """Flux derivatives dl, dr (nf, 5, 5), (ni, 5, 5) and reconstruction slopes lin (nf, 2, 5, 4)."""
     ni = neighbour.shape[0]
+    ambient = far.astype(np.complex128)
     for f in prange(owner.shape[0]):
         i = owner[f]
         nx, ny, nz, s = normal[f, 0], normal[f, 1], normal[f, 2], area[f]
@@ -84,7 +85,7 @@ def _linearise_faces(  # type: ignore[no-untyped-def]
                 lin[f, 0, k, 2] = slope
             for k in range(5):
                 z[k] += 1j * _H
-                e = boundary_flux(kind[f - ni], z[0], z[1], z[2], z[3], z[4], far, nx, ny, nz, ug)
+                e = boundary_flux(kind[f - ni], z[0], z[1], z[2], z[3], z[4], ambient, nx, ny, nz, ug)
                 z[k] = z[k].real
                 for m in range(5):
                     dl[f, m, k] = e[m].imag / _H * s
@@ -139,17 +140,22 @@ def _compact_blocks(offsets, faces, signs, slots, diagonal, extra, dl, dr, out):
     """Blocks of the compact (nearest-neighbour) Jacobian plus `extra` on the diagonal."""
     for c in prange(offsets.shape[0] - 1):
         d = diagonal[c]
-        out[d] = extra[c]
+        for a in range(5):
+            for b in range(5):
+                out[d, a, b] = extra[c, a, b]
         for e in range(offsets[c], offsets[c + 1]):
             f = faces[e]
             n = slots[e]
-            if signs[e] > 0:
-                out[d] += dl[f]
-                if n >= 0:
-                    out[n] = dr[f]
-            else:
-                out[d] -= dr[f]
-                out[n] = -dl[f]
+            # entry by entry: assigning whole blocks compiles ten times longer
+            for a in range(5):
+                for b in range(5):
+                    if signs[e] < 0:
+                        out[d, a, b] -= dr[f, a, b]
+                        out[n, a, b] = -dl[f, a, b]
+                    else:
+                        out[d, a, b] += dl[f, a, b]
+                        if n >= 0:
+                            out[n, a, b] = dr[f, a, b]
 
 
 class Jacobian:

@@ -41,25 +41,35 @@ def gradients(q, offsets, cells, weights, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _face_value(q, g, c, other, k, rx, ry, rz, dx, dy, dz, eps):  # type: ignore[no-untyped-def]
-    """Variable k of cell c at a face shared with cell `other`; (dx, dy, dz) leads from c to it."""
-    b = q[other, k] - q[c, k]
-    along = g[c, k, 0] * dx + g[c, k, 1] * dy + g[c, k, 2] * dz
+def _increment(own, other, gx, gy, gz, rx, ry, rz, dx, dy, dz, eps):  # type: ignore[no-untyped-def]
+    """Change of a variable from a cell's centre to a face; (dx, dy, dz) leads to the cell behind the face."""
+    b = other - own
+    along = gx * dx + gy * dy + gz * dz
     psi, _, _ = limiter(2.0 * along - b, b, eps)
     t = (rx * dx + ry * dy + rz * dz) / (dx * dx + dy * dy + dz * dz)
-    x = g[c, k, 0] * rx + g[c, k, 1] * ry + g[c, k, 2] * rz - (1.0 - psi) * t * along
-    if k == 0 or k == 4:
-        x, _, _ = saturate(x, q[c, k])
-    return q[c, k] + x
+    return gx * rx + gy * ry + gz * rz - (1.0 - psi) * t * along
 
 
 @njit(cache=True, error_model="numpy")
-def _boundary_value(q, g, c, k, rx, ry, rz):  # type: ignore[no-untyped-def]
-    """Variable k of cell c extrapolated to a boundary face."""
-    x = g[c, k, 0] * rx + g[c, k, 1] * ry + g[c, k, 2] * rz
-    if k == 0 or k == 4:
-        x, _, _ = saturate(x, q[c, k])
-    return q[c, k] + x
+def _face_state(q, o, g, rx, ry, rz, dx, dy, dz, eps):  # type: ignore[no-untyped-def]
+    """State q of a cell, with gradients g, at the face that it shares with a cell of state o."""
+    x0 = _increment(q[0], o[0], g[0, 0], g[0, 1], g[0, 2], rx, ry, rz, dx, dy, dz, eps)
+    x1 = _increment(q[1], o[1], g[1, 0], g[1, 1], g[1, 2], rx, ry, rz, dx, dy, dz, eps)
+    x2 = _increment(q[2], o[2], g[2, 0], g[2, 1], g[2, 2], rx, ry, rz, dx, dy, dz, eps)
+    x3 = _increment(q[3], o[3], g[3, 0], g[3, 1], g[3, 2], rx, ry, rz, dx, dy, dz, eps)
+    x4 = _increment(q[4], o[4], g[4, 0], g[4, 1], g[4, 2], rx, ry, rz, dx, dy, dz, eps)
+    return q[0] + saturate(x0, q[0])[0], q[1] + x1, q[2] + x2, q[3] + x3, q[4] + saturate(x4, q[4])[0]
+
+
+@njit(cache=True, error_model="numpy")
+def _boundary_state(q, g, rx, ry, rz):  # type: ignore[no-untyped-def]
+    """State q of a cell, with gradients g, extrapolated to a boundary face."""
+    x0 = g[0, 0] * rx + g[0, 1] * ry + g[0, 2] * rz
+    x1 = g[1, 0] * rx + g[1, 1] * ry + g[1, 2] * rz
+    x2 = g[2, 0] * rx + g[2, 1] * ry + g[2, 2] * rz
+    x3 = g[3, 0] * rx + g[3, 1] * ry + g[3, 2] * rz
+    x4 = g[4, 0] * rx + g[4, 1] * ry + g[4, 2] * rz
+    return q[0] + saturate(x0, q[0])[0], q[1] + x1, q[2] + x2, q[3] + x3, q[4] + saturate(x4, q[4])[0]
 
 
 @njit(cache=True, error_model="numpy")
@@ -87,36 +97,12 @@ def _face_fluxes(q, g, velocity, omega, owner, neighbour, kind, normal, area, mo
             sx, sy, sz = rj[f, 0], rj[f, 1], rj[f, 2]
             dx, dy, dz = rx - sx, ry - sy, rz - sz
             e = eps[f]
-            f0, f1, f2, f3, f4 = hllc(
-                _face_value(q, g, i, j, 0, rx, ry, rz, dx, dy, dz, e),
-                _face_value(q, g, i, j, 1, rx, ry, rz, dx, dy, dz, e),
-                _face_value(q, g, i, j, 2, rx, ry, rz, dx, dy, dz, e),
-                _face_value(q, g, i, j, 3, rx, ry, rz, dx, dy, dz, e),
-                _face_value(q, g, i, j, 4, rx, ry, rz, dx, dy, dz, e),
-                _face_value(q, g, j, i, 0, sx, sy, sz, -dx, -dy, -dz, e),
-                _face_value(q, g, j, i, 1, sx, sy, sz, -dx, -dy, -dz, e),
-                _face_value(q, g, j, i, 2, sx, sy, sz, -dx, -dy, -dz, e),
-                _face_value(q, g, j, i, 3, sx, sy, sz, -dx, -dy, -dz, e),
-                _face_value(q, g, j, i, 4, sx, sy, sz, -dx, -dy, -dz, e),
-                nx,
-                ny,
-                nz,
-                ug,
-            )
+            rl, ul, vl, wl, pl = _face_state(q[i], q[j], g[i], rx, ry, rz, dx, dy, dz, e)
+            rr, ur, vr, wr, pr = _face_state(q[j], q[i], g[j], sx, sy, sz, -dx, -dy, -dz, e)
+            f0, f1, f2, f3, f4 = hllc(rl, ul, vl, wl, pl, rr, ur, vr, wr, pr, nx, ny, nz, ug)
         else:
-            f0, f1, f2, f3, f4 = boundary_flux(
-                kind[f - ni],
-                _boundary_value(q, g, i, 0, rx, ry, rz),
-                _boundary_value(q, g, i, 1, rx, ry, rz),
-                _boundary_value(q, g, i, 2, rx, ry, rz),
-                _boundary_value(q, g, i, 3, rx, ry, rz),
-                _boundary_value(q, g, i, 4, rx, ry, rz),
-                far,
-                nx,
-                ny,
-                nz,
-                ug,
-            )
+            rl, ul, vl, wl, pl = _boundary_state(q[i], g[i], rx, ry, rz)
+            f0, f1, f2, f3, f4 = boundary_flux(kind[f - ni], rl, ul, vl, wl, pl, far, nx, ny, nz, ug)
         out[f, 0] = f0 * s
         out[f, 1] = f1 * s
         out[f, 2] = f2 * s

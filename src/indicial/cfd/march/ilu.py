@@ -55,9 +55,10 @@ class Pattern:
 @njit(cache=True, error_model="numpy")
 def _invert(a, out):  # type: ignore[no-untyped-def]
     """Inverse of a 5 x 5 block by Gauss-Jordan with partial pivoting; false if it is singular."""
-    m = a.copy()
+    m = np.empty((5, 5))
     for i in range(5):
         for j in range(5):
+            m[i, j] = a[i, j]
             out[i, j] = 1.0 if i == j else 0.0
     for c in range(5):
         p = c
@@ -88,7 +89,8 @@ def _invert(a, out):  # type: ignore[no-untyped-def]
 def _factorise(blocks, indptr, indices, diagonal):  # type: ignore[no-untyped-def]
     """Factors in place; diagonal blocks are left inverted. Returns the row of a singular block, or -1."""
     n = indptr.shape[0] - 1
-    place = np.full(n, -1, dtype=np.int32)
+    place = np.empty(n, dtype=np.int32)
+    place[:] = -1
     product = np.empty((5, 5))
     inverse = np.empty((5, 5))
     for i in range(n):
@@ -103,7 +105,9 @@ def _factorise(blocks, indptr, indices, diagonal):  # type: ignore[no-untyped-de
                     for m in range(5):
                         t += blocks[s, a, m] * d[m, b]
                     product[a, b] = t
-            blocks[s] = product
+            for a in range(5):
+                for b in range(5):
+                    blocks[s, a, b] = product[a, b]
             for u in range(diagonal[k] + 1, indptr[k + 1]):
                 target = place[indices[u]]
                 if target >= 0:
@@ -117,7 +121,9 @@ def _factorise(blocks, indptr, indices, diagonal):  # type: ignore[no-untyped-de
             place[indices[s]] = -1
         if not _invert(blocks[diagonal[i]], inverse):
             return i
-        blocks[diagonal[i]] = inverse
+        for a in range(5):
+            for b in range(5):
+                blocks[diagonal[i], a, b] = inverse[a, b]
     return -1
 
 
