@@ -15,6 +15,7 @@ from indicial.motion import AlphaStep, FlightCondition, PitchRateStep
 from indicial.pipeline.experiments import Fraction
 from indicial.pipeline.folder import digest
 from indicial.report.space import FlowPicture
+from indicial.rom.simulation import simulate
 
 
 @dataclass(frozen=True)
@@ -65,10 +66,11 @@ class FiniteVolumeFactory:
 
 
 def compile_kernels() -> None:
-    """Have every kernel of the solver compiled and cached on disk, by solving next to nothing.
+    """Have every kernel of solver and model compiled and cached on disk, by solving next to nothing.
 
-    A disturbed box of a few cells goes through a steady state and two unsteady steps.
+    A disturbed box of a few cells goes through a steady state and two unsteady steps; one lag state takes a step.
     """
+    simulate(-np.ones((1, 1)), np.ones((1, 1)), np.array([0.0, 1.0]), np.ones((2, 1)), np.zeros(1))
     condition = FlightCondition(2.0)
     reference = ReferenceQuantities(1.0, 1.0)
     solver = FiniteVolumeSolver(box_mesh((3, 3, 3)), reference, FlowSettings(1e-2, 2, 0.5))
