@@ -64,7 +64,12 @@ def error(n: int) -> float:
     return float(np.sum(mesh.cell_volume[:, None] * np.abs(result.q - exact)))
 
 
-def test_a_vortex_in_still_air_is_kept_with_second_order_under_motion_and_turning() -> None:
-    coarse, medium, fine = (error(n) for n in (24, 48, 96))
-    print(coarse, medium, fine, np.log2(coarse / medium), np.log2(medium / fine))
-    assert np.log2(medium / fine) == pytest.approx(2.0, abs=0.25)
+@pytest.mark.parametrize(("coarse", "least"), [(24, 1.75), pytest.param(48, 2.0, marks=pytest.mark.slow)])
+def test_a_vortex_in_still_air_is_kept_with_second_order_under_motion_and_turning(coarse: int, least: float) -> None:
+    """The upwind dissipation falls faster than h^2, so that the order seen comes down to 2 from above.
+
+    On the coarse meshes, of two and four cells a vortex radius, the limiter still acts.
+    """
+    order = np.log2(error(coarse) / error(2 * coarse))
+    print(order)
+    assert least < order < 3.0
