@@ -87,8 +87,9 @@ def _agreement(table: DerivativeTable, records: dict[str, Any]) -> list[dict[str
         total = f"{load}_q+{load}_alphadot"
         size = fom.value(total)
         alpha = f"{load}_alpha"
-        pair("static slope: IRM, MRF", alpha, irm.value(alpha), mrf.value(alpha), mrf.value(alpha))
-        pair("rate derivative: IRM, MRF", f"{load}_q", irm.value(f"{load}_q"), mrf.value(f"{load}_q"), size)
+        ends = records["irm"]["ends"]
+        pair("end of the step in alpha, MRF", alpha, ends["alpha"][load], mrf.value(alpha), mrf.value(alpha))
+        pair("end of the step in q, MRF", f"{load}_q", ends["q"][load], mrf.value(f"{load}_q"), size)
         if f"{load}_alphadot" in irm.names():
             lag = irm.value(f"{load}_alphadot")
             pair("lag: FOM at k, IRM at k = 0", f"{load}_alphadot", fom.value(f"{load}_alphadot"), lag, size)

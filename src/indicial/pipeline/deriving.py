@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
+from indicial.conventions import COEFFICIENTS
 from indicial.derivatives import Derivative, DerivativeTable
 from indicial.history import History
 from indicial.methods import forced_oscillation, indicial_response, moving_frame
@@ -224,9 +225,8 @@ def _indicial_response(context: Context, pool: ExperimentPool, threads: ThreadPo
     responses = _all(threads, {name: respond(*step) for name, step in steps.items()})
     up, down = responses["alpha_up"], responses["alpha_down"]
     faster, slower = responses["q"], responses["q_down"]
-    result = indicial_response.derive(
-        indicial_response.average(up, down), indicial_response.average(faster, slower), alpha_check=up, q_check=faster
-    )
+    alpha_mean, q_mean = indicial_response.average(up, down), indicial_response.average(faster, slower)
+    result = indicial_response.derive(alpha_mean, q_mean, alpha_check=up, q_check=faster)
     linearity = [
         {"method": "irm", "name": f"{name}_{cause}(s)", "what": "opposite step", "change": change}
         for cause, pair in (("alpha", (up, down)), ("q", (faster, slower)))
@@ -236,6 +236,11 @@ def _indicial_response(context: Context, pool: ExperimentPool, threads: ThreadPo
     finals = {
         cause: {name: result.values[f"{name}_{cause}"] for name in indicial_response.LOADS} for cause in ("alpha", "q")
     }
+    # what the marches themselves end at: the finals above are those of steady runs
+    ends = {
+        cause: {name: float(mean.response[-1, COEFFICIENTS.index(name)]) for name in indicial_response.LOADS}
+        for cause, mean in (("alpha", alpha_mean), ("q", q_mean))
+    }
     tails = {name: integral.reason for name, integral in result.integrals.items()}
     table = result.derivatives()
     return Outcome(
@@ -244,6 +249,7 @@ def _indicial_response(context: Context, pool: ExperimentPool, threads: ThreadPo
             "refused": result.refused,
             "linearity": linearity,
             "finals": finals,
+            "ends": ends,
             "tails": tails,
         },
         _values(table, ("CN_alpha", "Cm_alphadot", "Cm_q")) + "".join(f", {name} refused" for name in result.refused),
