@@ -3,17 +3,29 @@
 from __future__ import annotations
 
 import sys
+from typing import Any
+
+import typer
 
 from indicial.cli.commands import app
 from indicial.errors import IndicialError, InputError
 
 __all__ = ["app", "main"]
 
+# What the command line's own parser raises; typer exports only its descendants.
+_UsageError: Any = typer.BadParameter.__base__
+
 
 def main() -> None:
     """Run the command line: exit code 0 if all went well, 2 for bad input, 1 for a failure of the work itself."""
     try:
-        app()
+        # By itself typer draws a box of several lines round a wrong option.
+        sys.exit(app(standalone_mode=False))
+    except _UsageError as error:
+        message = error.format_message()
+        _fail(f"{message} (see {error.ctx.command_path} --help)" if message and error.ctx else message, error.exit_code)
+    except typer.Abort:
+        _fail("interrupted", 130)
     except InputError as error:
         _fail(str(error), 2)
     except IndicialError as error:
@@ -25,5 +37,6 @@ def main() -> None:
 
 
 def _fail(message: str, code: int) -> None:
-    sys.stderr.write(f"indicial: {' '.join(message.split())}\n")
+    if message:
+        sys.stderr.write(f"indicial: {' '.join(message.split())}\n")
     sys.exit(code)

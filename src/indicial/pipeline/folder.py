@@ -25,9 +25,12 @@ class RunFolder:
     Parameters
     ----------
     path : Path
+    case_text : str, optional
+        The case file that is to be kept beside the results, if it is not there already.
     """
 
     path: Path
+    case_text: str | None = None
 
     @property
     def experiments(self) -> Path:
@@ -53,9 +56,10 @@ class RunFolder:
         """The mesh of the whole model or of its half."""
         return self.path / "mesh" / ("whole.npz" if whole else "half.npz")
 
-    def keep_case(self, text: str) -> None:
+    def keep_case(self) -> None:
         """Keep the case file beside its results."""
-        write_text(self.path / CASE_FILE, text)
+        if self.case_text is not None:
+            write_text(self.path / CASE_FILE, self.case_text)
 
     def read(self, stage: str) -> dict[str, Any]:
         """The results of a stage.
@@ -94,7 +98,7 @@ class RunFolder:
 
 
 def open_run(target: str | Path, output: str | Path | None = None) -> tuple[Case, RunFolder]:
-    """The case and folder that a user names: a case file, or the folder of an earlier run.
+    """The case and folder that a user names: a case file, or the folder of an earlier run. Nothing is written.
 
     Parameters
     ----------
@@ -110,6 +114,8 @@ def open_run(target: str | Path, output: str | Path | None = None) -> tuple[Case
     """
     from indicial.reference_data import find_case
 
+    if not str(target).strip():
+        raise InputError("no case is named; give a case file or the folder of an earlier run")
     given = Path(target)
     if given.is_dir():
         if output is not None and Path(output).resolve() != given.resolve():
@@ -117,14 +123,13 @@ def open_run(target: str | Path, output: str | Path | None = None) -> tuple[Case
         file = given / CASE_FILE
         if not file.is_file():
             raise InputError(f"{target}: not a run folder, there is no {CASE_FILE} in it; give a case file")
-        return parse_case(file.read_text(encoding="utf-8"), str(file)), RunFolder(given)
+        return parse_case(_read(file), str(file)), RunFolder(given)
     file = find_case(given)
     text = _read(file)
     case = parse_case(text, str(target))
-    folder = RunFolder(Path(output) if output is not None else Path("runs") / file.stem)
+    folder = RunFolder(Path(output) if output is not None else Path("runs") / file.stem, text)
     if folder.path.exists() and not folder.path.is_dir():
         raise InputError(f"{folder.path}: is a file; --output must name a folder")
-    folder.keep_case(text)
     return case, folder
 
 

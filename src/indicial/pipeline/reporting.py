@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from indicial.cfd.mesh import Mesh
 from indicial.derivatives import DerivativeTable
+from indicial.errors import InputError
 from indicial.history import History
 from indicial.pipeline.context import Context, Outcome
 from indicial.pipeline.flying import load_flights
@@ -26,10 +28,28 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+_KEYS = [
+    "agreement",
+    "case",
+    "damping",
+    "derivatives",
+    "flight",
+    "identification",
+    "linearity",
+    "measured_data",
+    "mesh",
+    "rom",
+    "statement",
+    "timings_s",
+    "title",
+    "versions",
+]
+
+
 def write_report(context: Context) -> Outcome:
     """Draw every figure, and write ``report.html``."""
     folder = context.folder
-    results = json.loads((folder.path / "results.json").read_text(encoding="utf-8"))
+    results = _results(folder.path / "results.json")
     rows = comparison(DerivativeTable.from_records(results["derivatives"]))
     makers = [_comparison, _mesh_and_flow, _moving_frame, _oscillations, _steps, _models, _flights, _identification]
     chapters = []
@@ -41,6 +61,25 @@ def write_report(context: Context) -> Outcome:
     facts = {**results["versions"], "CFD": f"{results['timings_s']['irm']:.0f} s"}
     write_html(folder.path / "report.html", results["title"], lead, chapters, facts)
     return Outcome({}, str(folder.path / "report.html"))
+
+
+def _results(path: Path) -> dict[str, Any]:
+    """The content of ``results.json``, with every key that the report reads.
+
+    Raises
+    ------
+    InputError
+        If it is missing or damaged.
+    """
+    advice = "run `indicial compare` again"
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read ({error}); {advice}") from error
+    missing = _KEYS if not isinstance(content, dict) else [key for key in _KEYS if key not in content]
+    if missing:
+        raise InputError(f"{path}: holds no {', '.join(map(repr, missing))}; {advice}")
+    return dict(content)
 
 
 def _lead(results: dict[str, Any]) -> Iterator[str]:
@@ -194,12 +233,13 @@ def _oscillations(context: Context, results: dict[str, Any], rows: list[Comparis
 
 def _steps(context: Context, results: dict[str, Any], rows: list[ComparisonRow]) -> Chapter:
     histories = {name: History.from_netcdf(context.folder.histories / f"irm_{name}.nc") for name in STEPS}
-    steps = {"alpha": [histories["alpha_up"], histories["alpha_down"]], "q": [histories["q"]]}
+    steps = {"alpha": [histories["alpha_up"], histories["alpha_down"]], "q": [histories["q"], histories["q_down"]]}
     irm = context.folder.read("irm")
     tails = [f"{name}: {reason}" for name, reason in irm["tails"].items()]
     refused = [f"Refused: {name}, {reason}" for name, reason in irm["refused"].items()]
     caption = (
-        "Responses to steps. The dot is the first instant (piston theory); the shaded area is the deficiency (Eq. 17)."
+        "Responses to steps, per unit step; opposite steps lie on one another where the answer is linear. The dot is "
+        "the first computed instant, where piston theory holds; the shaded area is the deficiency (Eq. 17)."
     )
     picture = _picture(context, "steps", lambda: step_figure(steps), caption)
     return Chapter("Indicial response", [*tails, *refused], (), [picture])

@@ -114,6 +114,7 @@ def run_stages(
     count = case.run.workers if workers is None else workers
     context = Context(case, folder, count, reporter, make_factory or _finite_volume)
     _require(context, stages)
+    folder.keep_case()
     due = [s for s in stages if not (resume and folder.is_fresh(s, stage_key(case, s)))]
     methods = tuple(s for s in due if s in DERIVING)
     if methods and make_factory is None:

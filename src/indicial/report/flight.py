@@ -112,7 +112,7 @@ def record_figure(record: RangeRecord, residuals: Mapping[str, Array], noise: Ma
     noise : mapping
         Standard deviation of each channel, in the same units.
     """
-    panels = ((("pitch", "yaw"), "angle [deg]", math.degrees(1.0)), (("y", "z"), "swerve [mm]", 1e3))
+    panels = ((("pitch", "yaw"), "angle [deg]", math.degrees(1.0)), (("y", "z"), "swerve [mm]\n(y right, z down)", 1e3))
     with figure_style() as plt:
         figure: Figure
         figure, axes = plt.subplots(3, 1, figsize=(8.6, 8.0), sharex=True)

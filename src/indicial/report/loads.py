@@ -93,26 +93,33 @@ def step_figure(steps: Mapping[str, Sequence[History]]) -> Figure:
                 axes = panels[row, column]
                 for colour, history in zip((BLUE, ORANGE, GREEN, PURPLE), histories, strict=False):
                     response = unit_response(history, name)
-                    size = f"{np.degrees(history.motion.get('amplitude', 0.0)):+.3g}°" if stepped == "alpha" else ""
-                    axes.plot(history.s, response, color=colour, lw=1.4, label=f"response {size}".strip())
+                    axes.plot(history.s, response, color=colour, lw=1.4, label=f"response to {_step_size(history)}")
                 first, response = histories[0], unit_response(histories[0], name)
                 axes.axhline(response[-1], color=GREY, lw=0.8, ls="--", label="final value")
                 axes.fill_between(first.s, response, response[-1], color=BLUE, alpha=0.15, label="deficiency")
                 axes.plot(0.0, response[0], "o", color=BLACK, ms=5, label="first instant")
                 axes.set_ylabel(f"{symbol(f'{name}_{stepped}')} (s), per rad")
             panels[0, column].set_title(names.get(stepped, stepped))
+            panels[0, column].legend(fontsize=8)
             panels[1, column].set_xlabel("reduced time s = 2Vt/d")
-        panels[0, 0].legend(fontsize=8)
         return figure
+
+
+def _step(history: History) -> float:
+    """What was stepped: alpha [rad], or q c/2V."""
+    if history.motion["kind"] == "alpha_step":
+        return float(history.motion["amplitude"])
+    return float(history.reduced_rate[-1, 1])
+
+
+def _step_size(history: History) -> str:
+    step = _step(history)
+    return f"{np.degrees(step):+.3g}°" if history.motion["kind"] == "alpha_step" else f"q d/2V = {step:+.3g}"
 
 
 def unit_response(history: History, name: str) -> Array:
     """Response per unit step: of alpha per rad, of q per ``q c/2V``, shape (n,)."""
-    if history.motion["kind"] == "alpha_step":
-        step = float(history.motion["amplitude"])
-    else:
-        step = float(history.reduced_rate[-1, 1] - 0.0)
-    response: Array = (history[name] - history.initial(name)) / step
+    response: Array = (history[name] - history.initial(name)) / _step(history)
     return response
 
 
@@ -132,7 +139,7 @@ def prediction_figure(checks: Mapping[str, tuple[History, Mapping[str, Array]]])
         for column, (title, (history, models)) in enumerate(checks.items()):
             for row, name in enumerate(PAIR):
                 axes, index = panels[row, column], COEFFICIENTS.index(name)
-                axes.plot(history.s, history[name], ".", color=BLACK, ms=3, label="CFD")
+                axes.plot(history.s, history[name], ".", color=BLACK, ms=4, zorder=3, label="CFD")
                 for (colour, line, width), (model, values) in zip(lines, models.items(), strict=False):
                     axes.plot(history.s, values[:, index], line, color=colour, lw=width, label=model)
                 axes.set_ylabel(symbol(name))

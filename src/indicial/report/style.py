@@ -80,8 +80,6 @@ def figure_style() -> Iterator[Any]:
         "axes.spines.right": False,
         "legend.frameon": False,
         "figure.dpi": 110,
-        "savefig.dpi": 130,
-        "savefig.bbox": "tight",
         "figure.constrained_layout.use": True,
     }
     with mpl.rc_context(settings):
@@ -96,6 +94,6 @@ def save(figure: Figure, path: Path) -> Path:
     import matplotlib.pyplot as plt
 
     with atomic_path(path) as temporary:
-        figure.savefig(temporary, format="png")
+        figure.savefig(temporary, format="png", dpi=130, bbox_inches="tight")
     plt.close(figure)
     return path
