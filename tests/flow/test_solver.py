@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,6 +17,7 @@ from indicial.cfd.shapes import Cone
 from indicial.conventions import ReferenceQuantities
 from indicial.errors import DivergenceError, InputError
 from indicial.history import History
+from indicial.methods import forced_oscillation, indicial_response
 from indicial.motion import AlphaStep, FlightCondition, PitchRateStep, Rates
 
 CONDITION = FlightCondition(2.0)
@@ -78,6 +80,37 @@ def test_a_steady_state_of_another_mesh_is_not_read_back(tmp_path: Path) -> None
     mesh = plate_mesh(n_chord=17, n_normal=12, height=0.4, ahead=0.2, behind=0.1)
     FiniteVolumeSolver(mesh, REFERENCE, folder=tmp_path, progress=told.append).steady(condition)
     assert told
+
+
+def test_a_steady_state_under_other_boundary_conditions_is_not_read_back(tmp_path: Path) -> None:
+    condition = FlightCondition(2.0, alpha=0.01)
+    plate(tmp_path).steady(condition)
+    told: list[float] = []
+    mesh = plate().mesh
+    patches = tuple(replace(patch, kind="farfield") if patch.name == "outflow" else patch for patch in mesh.patches)
+    other = replace(mesh, patches=patches)
+    FiniteVolumeSolver(other, REFERENCE, EXACT, folder=tmp_path, progress=told.append).steady(condition)
+    assert told
+
+
+def test_the_number_of_periods_does_not_change_the_first_one() -> None:
+    """Four periods among them: eighths of that record are half periods, at which a plunging body is where it was."""
+    loads = [
+        forced_oscillation.run(
+            plate(), CONDITION, 0.005, 0.2, "plunge", periods=periods, steps_per_period=16
+        ).coefficients[:17]
+        for periods in (1, 4)
+    ]
+    assert loads[1] == pytest.approx(loads[0], abs=1e-8 * np.max(np.abs(loads[0])))
+
+
+def test_a_step_that_leads_the_extrapolated_pressure_below_zero_ends_in_the_steady_state() -> None:
+    step = AlphaStep(CONDITION, np.radians(20.0))
+    solver = FiniteVolumeSolver(plate().mesh, REFERENCE)
+    times = indicial_response.step_times(0.5, 1.12, 1.5, 12.0) / (2.0 * CONDITION.speed)
+    last = solver.unsteady(CONDITION, step, times).coefficients[-1]
+    final = solver.steady(*indicial_response.after(step)).coefficients
+    assert last == pytest.approx(final, abs=2e-3 * np.max(np.abs(final)))
 
 
 @pytest.mark.parametrize(

@@ -92,7 +92,7 @@ class FiniteVolumeSolver:
         self._pattern = Pattern.of(self.grid)
         self._states: dict[str, SteadyState] = {}
         self._mirrored = _is_half_body(self.grid)
-        self._mesh_key = hashlib.sha256(mesh.points.tobytes() + mesh.owner.tobytes()).hexdigest()[:16]
+        self._mesh_key = _mesh_key(mesh)
 
     @property
     def reference(self) -> ReferenceQuantities:
@@ -150,7 +150,8 @@ class FiniteVolumeSolver:
         initial = self._coefficients(*self._residual.forces(AMBIENT_PRESSURE), condition)
         checkpoint = None
         if self._folder is not None:
-            key = self._key(condition, velocity, rate, t, self.settings.unsteady_tolerance)
+            start_of = (motion.velocity_before, motion.rate_before, self.settings.steady_tolerance)
+            key = self._key(condition, *start_of, velocity, rate, t, self.settings.unsteady_tolerance)
             checkpoint = Checkpoint(self._folder / f"march-{key}.npz", key)
         try:
             result = march(
@@ -296,6 +297,14 @@ class FiniteVolumeSolver:
             else:
                 digest.update(repr(part).encode())
         return digest.hexdigest()[:20]
+
+
+def _mesh_key(mesh: Mesh) -> str:
+    """A name for a mesh: its points, which cells its faces part, and what its patches are."""
+    digest = hashlib.sha256(repr(mesh.patches).encode())
+    for array in (mesh.points, mesh.owner, mesh.neighbour):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()[:16]
 
 
 def _is_half_body(grid: Grid) -> bool:

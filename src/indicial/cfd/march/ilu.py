@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from indicial.cfd.flow.grid import Grid
 from indicial.conventions import Array, Index
+from indicial.errors import DivergenceError
 
 
 @dataclass(frozen=True)
@@ -164,7 +165,7 @@ class BlockILU:
 
     Raises
     ------
-    ZeroDivisionError
+    DivergenceError
         If a diagonal block becomes singular.
     """
 
@@ -172,7 +173,7 @@ class BlockILU:
         self.pattern = pattern
         row = _factorise(blocks, pattern.indptr, pattern.indices, pattern.diagonal)
         if row >= 0:
-            raise ZeroDivisionError(f"singular diagonal block of cell {row}")
+            raise DivergenceError(f"the linearised equations of cell {row} are singular", cell=row)
         self._factors: NDArray[np.float32] = blocks.astype(np.float32)
 
     def solve(self, b: Array) -> Array:

@@ -141,7 +141,7 @@ def _iterate(
 
         solution = gmres(shifted, ilu.solve, -r, forcing)
         spent += solution.products
-        trial = _limited_update(q, solution.x)
+        trial = limited_update(q, solution.x)
         r_trial = residual(trial, motion)
         norm_trial = float(np.linalg.norm(r_trial)) / scale
         log.debug("residual %.2e, CFL %.1e, %d products", norm_trial, cfl, solution.products)
@@ -168,7 +168,7 @@ def _iterate(
     return q, spent
 
 
-def _limited_update(q: Array, dq: Array) -> Array:
+def limited_update(q: Array, dq: Array) -> Array:
     """q + dq, cell by cell shortened so that density and pressure change by at most a part."""
     ratio = np.maximum(np.abs(dq[:, 0] / q[:, 0]), np.abs(dq[:, P] / q[:, P]))
     factor = np.minimum(1.0, _LARGEST_CHANGE / np.maximum(ratio, 1e-300))

@@ -15,13 +15,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from indicial.cfd.flow.gas import conservative, conservative_jacobian
+from indicial.cfd.flow.gas import RHO, P, conservative, conservative_jacobian
 from indicial.cfd.flow.jacobian import Jacobian
 from indicial.cfd.flow.residual import MeshMotion, Residual
 from indicial.cfd.march.checkpoint import Checkpoint
 from indicial.cfd.march.ilu import BlockILU, Pattern
 from indicial.cfd.march.krylov import gmres
-from indicial.cfd.march.steady import Progress
+from indicial.cfd.march.steady import Progress, limited_update
 from indicial.conventions import Array
 from indicial.errors import DivergenceError
 
@@ -88,10 +88,19 @@ class _Stepper:
 
 
 def _kick(residual: Residual, q: Array, motion_at: MotionAt, times: Array) -> float:
-    """What the motion does to the residual of the first state: the scale of the steps' tolerance."""
-    sample = times[np.unique(np.linspace(0, len(times) - 1, 9).astype(int))]
-    base = residual(q, motion_at(-1.0))
-    kick = max(float(np.linalg.norm(residual(q, motion_at(float(t))) - base)) for t in sample)
+    """What the motion does to the residual of the first state: the scale of the steps' tolerance.
+
+    Taken where V_b and where omega are furthest from the start: instants chosen beforehand may all be whole periods
+    of an oscillation, where nothing has changed.
+    """
+    before = motion_at(-1.0)
+    motions = [motion_at(float(t)) for t in times]
+    furthest = {
+        int(np.argmax([np.linalg.norm(motion.velocity - before.velocity) for motion in motions])),
+        int(np.argmax([np.linalg.norm(motion.omega - before.omega) for motion in motions])),
+    }
+    base = residual(q, before)
+    kick = max(float(np.linalg.norm(residual(q, motions[m]) - base)) for m in furthest)
     return kick if kick > 0.0 else 1.0
 
 
@@ -147,11 +156,14 @@ def march(
         ratio = dt / float(times[m - 1] - times[m - 2]) if m > 1 else 0.0
         c0, c1, c2 = (1.0 + 2.0 * ratio) / (1.0 + ratio), -(1.0 + ratio), ratio**2 / (1.0 + ratio)
         known = (volume / dt)[:, None] * (c1 * conservative(q) + c2 * conservative(before))
+        guess = q + ratio * (q - before)
+        if np.any(guess[:, [RHO, P]] <= 0.0):
+            guess = q
         try:
             new, used, left = _step(
                 residual,
                 stepper,
-                q + ratio * (q - before),
+                guess,
                 known,
                 c0 / dt,
                 motion_at(float(times[m])),
@@ -192,10 +204,10 @@ def _step(
     for used in range(_NEWTON_STEPS):
         if norm <= target:
             return q, used, norm
-        q_new = q - stepper.solve(r, shift, max(0.3 * target / norm, 1e-4))
+        q_new = limited_update(q, -stepper.solve(r, shift, max(0.3 * target / norm, 1e-4)))
         r, norm_new = unsteady_residual(q_new)
         if not norm_new < 0.2 * norm:
-            if not (np.isfinite(norm_new) and np.all(q_new[:, 0] > 0.0) and np.all(q_new[:, 4] > 0.0)):
+            if not np.isfinite(norm_new):
                 q_new = q
             stepper.linearise(q_new, motion)
             r, norm_new = unsteady_residual(q_new)
