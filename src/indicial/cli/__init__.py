@@ -24,7 +24,10 @@ def main() -> None:
     except _UsageError as error:
         message = error.format_message()
         _fail(f"{message} (see {error.ctx.command_path} --help)" if message and error.ctx else message, error.exit_code)
-    except typer.Abort:
+    except typer.Abort as error:
+        # The parser takes an unexpected end of file for a closed terminal.
+        if isinstance(error.__cause__, EOFError):
+            _fail("a file of the run is empty or cut short; give the same command to a new run folder", 2)
         _fail("interrupted", 130)
     except InputError as error:
         _fail(str(error), 2)
