@@ -85,7 +85,6 @@ def comparison_text(rows: Sequence[ComparisonRow]) -> str:
         if any(d is not None for d in deviations):
             shown = ["" if d is None else f"({d:+.0%})" for d in deviations]
             lines.append(f"{'  from measured':<18}" + "".join(f"{cell:>18}" for cell in shown))
-    lines.append("± is what a method knows of its own error; it does not hold the error of the mesh")
     return "\n".join(lines)
 
 
