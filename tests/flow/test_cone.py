@@ -50,9 +50,9 @@ def test_cone_loads_equal_conical_flow_theory(mach: float) -> None:
 def test_cone_loads_converge_to_theory_with_second_order(
     mach: float, coarse: float, fine: float, allowed: float
 ) -> None:
-    """Halving the cells divides the errors by about four; by three at least where they are still to be seen."""
+    """Errors fall at least with the 1.6th power of the cells' size: by three where it is halved."""
     before, after = errors(mach, coarse), errors(mach, fine)
     for name in ("CN_alpha", "Cm_alpha"):
         assert abs(after[name]) < allowed
-        assert abs(after[name]) < abs(before[name]) / 3.0
+        assert abs(after[name]) < abs(before[name]) * (coarse / fine) ** 1.6
     assert abs(after["CA_0"]) < 0.005
