@@ -43,7 +43,7 @@ def test_statement_is_made_from_the_numbers():
     said = statement(comparison(TABLE), "a mesh of 10 cells")
     assert "On a mesh of 10 cells" in said
     assert "Cm_alpha +10% (by MRF, 2.0 standard errors)" in said
-    assert "Cm_q+Cm_alphadot -25% (by FOM, 3.0 standard errors)" in said
+    assert "Cm_q+Cm_alphadot -25% (by FOM at k = 0.1, 3.0 standard errors)" in said
     assert "CN_q" not in said
     assert "no computed derivative" in statement(comparison(TABLE.select(method="mrf")), "it")
 

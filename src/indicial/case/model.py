@@ -153,8 +153,12 @@ class ForcedOscillation(Section):
 class IndicialResponse(Section):
     """Responses to steps in alpha and in q (IRM)."""
 
-    alpha_amplitude_deg: Annotated[SmallAngle, Field(description="step in alpha, made upward and downward")] = 0.25
+    alpha_amplitude_deg: Annotated[SmallAngle, Field(description="step in alpha")] = 0.25
     pitch_rate: Annotated[SmallRate, Field(description="step in q c/2V")] = 0.0005
+    second_factor: Annotated[
+        float,
+        Field(gt=1.0, le=4.0, description="second size of both steps, relative to the first: shows linearity"),
+    ] = 2.0
     first_step: Annotated[Positive, Field(description="first time step, in s = 2Vt/c")] = 0.05
     growth: Annotated[float, Field(ge=1.0, le=1.5, description="ratio of neighbouring time steps, up to the last")] = (
         1.1

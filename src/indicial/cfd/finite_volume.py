@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from indicial import __version__
 from indicial.cfd.field import FlowField
-from indicial.cfd.flow.gas import GAMMA
-from indicial.cfd.flow.grid import SYMMETRY, Grid
+from indicial.cfd.flow.gas import GAMMA, P
+from indicial.cfd.flow.grid import OUTFLOW, SYMMETRY, Grid
 from indicial.cfd.flow.residual import MeshMotion, Residual
 from indicial.cfd.march.checkpoint import Checkpoint
 from indicial.cfd.march.ilu import Pattern
@@ -226,6 +226,7 @@ class FiniteVolumeSolver:
                 found = SteadyState(checkpoint["q"], motion, checkpoint["residuals"], int(checkpoint["products"]))
             else:
                 found = self._converged(motion, key)
+                self._check_outflow(found)
                 if stored is not None:
                     stored.save(q=found.q, residuals=found.residuals, products=np.array(found.products))
             self._states[key] = found
@@ -250,6 +251,20 @@ class FiniteVolumeSolver:
                 Checkpoint(path, key).save(q=np.asarray(error.state))
                 kept = f"; the last good state is in {path}"
             raise DivergenceError(f"{error}; {self._place(error)}{kept}") from error
+
+    def _check_outflow(self, state: SteadyState) -> None:
+        """All that leaves by an outflow patch must leave faster than sound: nothing is said there of what is behind."""
+        g = self.grid
+        faces = g.n_interior + np.flatnonzero(g.kind == OUTFLOW)
+        q = state.q[g.owner[faces]]
+        through = g.normal[faces] @ state.motion.velocity + (g.moment[faces] @ state.motion.omega) / g.area[faces]
+        mach = (np.sum(q[:, 1:4] * g.normal[faces], axis=1) - through) / np.sqrt(GAMMA * q[:, P] / q[:, 0])
+        slow = int(np.sum(mach < 1.0))
+        if slow:
+            raise InputError(
+                f"{slow} of {faces.size} outflow faces are not crossed at supersonic speed (least Mach number "
+                f"{np.min(mach):.2f}): use a higher Mach number, or a mesh that goes on downstream"
+            )
 
     def _place(self, error: DivergenceError) -> str:
         """Where it went wrong, in mesh coordinates."""

@@ -205,10 +205,10 @@ def _indicial_response(context: Context, pool: ExperimentPool, threads: ThreadPo
     instants = _step_instants(context)
     alpha = math.radians(settings.alpha_amplitude_deg)
     steps: dict[str, tuple[indicial_response.StepKind, float]] = {
-        "alpha_up": ("alpha", alpha),
-        "alpha_down": ("alpha", -alpha),
+        "alpha": ("alpha", alpha),
+        "alpha_larger": ("alpha", settings.second_factor * alpha),
         "q": ("q", settings.pitch_rate),
-        "q_down": ("q", -settings.pitch_rate),
+        "q_larger": ("q", settings.second_factor * settings.pitch_rate),
     }
 
     def respond(kind: indicial_response.StepKind, size: float) -> Callable[[], indicial_response.StepResponse]:
@@ -223,14 +223,19 @@ def _indicial_response(context: Context, pool: ExperimentPool, threads: ThreadPo
 
     label = {step: name for name, step in steps.items()}
     responses = _all(threads, {name: respond(*step) for name, step in steps.items()})
-    up, down = responses["alpha_up"], responses["alpha_down"]
-    faster, slower = responses["q"], responses["q_down"]
-    alpha_mean, q_mean = indicial_response.average(up, down), indicial_response.average(faster, slower)
-    result = indicial_response.derive(alpha_mean, q_mean, alpha_check=up, q_check=faster)
+    checks = {cause: responses[f"{cause}_larger"] for cause in ("alpha", "q")}
+    result = indicial_response.derive(
+        responses["alpha"], responses["q"], alpha_check=checks["alpha"], q_check=checks["q"]
+    )
     linearity = [
-        {"method": "irm", "name": f"{name}_{cause}(s)", "what": "opposite step", "change": change}
-        for cause, pair in (("alpha", (up, down)), ("q", (faster, slower)))
-        for name, change in indicial_response.linearity(*pair).items()
+        {
+            "method": "irm",
+            "name": f"{name}_{cause}(s)",
+            "what": f"amplitude times {settings.second_factor:g}",
+            "change": change,
+        }
+        for cause, check in checks.items()
+        for name, change in indicial_response.linearity(responses[cause], check).items()
         if name in indicial_response.LOADS
     ]
     finals = {
@@ -238,8 +243,10 @@ def _indicial_response(context: Context, pool: ExperimentPool, threads: ThreadPo
     }
     # what the marches themselves end at: the finals above are those of steady runs
     ends = {
-        cause: {name: float(mean.response[-1, COEFFICIENTS.index(name)]) for name in indicial_response.LOADS}
-        for cause, mean in (("alpha", alpha_mean), ("q", q_mean))
+        cause: {
+            name: float(responses[cause].response[-1, COEFFICIENTS.index(name)]) for name in indicial_response.LOADS
+        }
+        for cause in ("alpha", "q")
     }
     tails = {name: integral.reason for name, integral in result.integrals.items()}
     table = result.derivatives()

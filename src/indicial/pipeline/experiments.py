@@ -15,6 +15,7 @@ import multiprocessing
 import os
 import re
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -35,6 +36,8 @@ from indicial.motion import FlightCondition, Motion, Rates, SteadyMotion
 from indicial.solver import Solver, SteadyLoads
 
 log = logging.getLogger(__name__)
+
+_ABANDONED = 3600.0  # age of a half-written file that nobody is writing any more [s]
 
 Fraction = Callable[[float], None]
 """Told the fraction of one experiment that is done, 0 to 1."""
@@ -148,7 +151,9 @@ class ExperimentPool:
         self._watch = watch
         self._lock = threading.Lock()
         for unfinished in folder.glob(".*"):
-            unfinished.unlink()  # files that a run was writing when it was ended
+            # a file that a run was writing when it was ended, unless another run is writing it now
+            if time.time() - unfinished.stat().st_mtime > _ABANDONED:
+                unfinished.unlink(missing_ok=True)
         self._futures: dict[str, Future[None]] = {}
         share = max(1, (os.cpu_count() or 1) // workers)
         context = multiprocessing.get_context("spawn")

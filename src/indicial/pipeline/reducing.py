@@ -23,7 +23,7 @@ from indicial.rom import (
     realise,
 )
 
-STEPS = ("alpha_up", "alpha_down", "q", "q_down")
+STEPS = ("alpha", "q")
 MOTIONS = ("pitch", "plunge")
 
 

@@ -116,7 +116,7 @@ def _comparison(context: Context, results: dict[str, Any], rows: list[Comparison
             "Per radian; rates made dimensionless as q d/2V. Below each value its difference from the one measured in "
             "free flight (negative: too small in size).",
             "The number after ± is about one standard deviation of what each method knows of its own error: MRF the "
-            "change at a second amplitude; FOM scatter and drift from period to period; IRM the opposite step, the "
+            "change at a second amplitude; FOM scatter and drift from period to period; IRM the larger step, the "
             "tail and the quadrature; identified the standard error; free flight the printed error and interpolation "
             "over Mach number. It does not hold the error of the mesh.",
             "MRF: steady states in a "
@@ -232,14 +232,17 @@ def _oscillations(context: Context, results: dict[str, Any], rows: list[Comparis
 
 
 def _steps(context: Context, results: dict[str, Any], rows: list[ComparisonRow]) -> Chapter:
-    histories = {name: History.from_netcdf(context.folder.histories / f"irm_{name}.nc") for name in STEPS}
-    steps = {"alpha": [histories["alpha_up"], histories["alpha_down"]], "q": [histories["q"], histories["q_down"]]}
+    folder = context.folder.histories
+    steps = {
+        cause: [History.from_netcdf(folder / f"irm_{name}.nc") for name in (cause, f"{cause}_larger")]
+        for cause in STEPS
+    }
     irm = context.folder.read("irm")
     tails = [f"{name}: {reason}" for name, reason in irm["tails"].items()]
     refused = [f"Refused: {name}, {reason}" for name, reason in irm["refused"].items()]
     caption = (
-        "Responses to steps, per unit step; opposite steps lie on one another where the answer is linear. The dot is "
-        "the first computed instant, where piston theory holds; the shaded area is the deficiency (Eq. 17)."
+        "Responses to steps, per unit step; two sizes lie on one another where the answer is linear. The dot is the "
+        "first computed instant, where piston theory holds; the shaded area is the deficiency (Eq. 17)."
     )
     picture = _picture(context, "steps", lambda: step_figure(steps), caption)
     return Chapter("Indicial response", [*tails, *refused], (), [picture])

@@ -115,7 +115,11 @@ def statement(rows: Sequence[ComparisonRow], mesh: str) -> str:
         sigma = ""
         if measured.uncertainty:
             sigma = f", {abs(row.records[method].value - measured.value) / measured.uncertainty:.1f} standard errors"
-        parts.append(f"{row.name} {worst:+.0%} (by {method.upper()}{sigma})")
+        k = row.records[method].k
+        at = "" if k is None else f" at k = {k:g}"
+        others = [f"{m.upper()} {d:+.0%}" for m, d in deviations.items() if m != method]
+        aside = f"; {', '.join(others)}" if others else ""
+        parts.append(f"{row.name} {worst:+.0%} (by {method.upper()}{at}{sigma}{aside})")
     if not parts:
         return f"On {mesh} no computed derivative has a measured value to be compared with."
     note = ""

@@ -38,7 +38,7 @@ class Checkpoint:
                 if str(stored["key"]) != self._key:
                     return None
                 return {name: stored[name] for name in stored.files if name != "key"}
-        except (OSError, KeyError, ValueError, zipfile.BadZipFile):
+        except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):
             return None
 
     def save(self, **arrays: Array) -> None:

@@ -38,7 +38,7 @@ def load_mesh(path: str | Path) -> Mesh:
             arrays = {name: archive[name] for name in _ARRAYS}
     except FileNotFoundError:
         raise InputError(f"mesh file {path} does not exist") from None
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
         raise InputError(f"mesh file {path} cannot be read as a mesh: {error}") from error
     if header.get("schema") != "indicial.mesh" or header.get("schema_version") != SCHEMA_VERSION:
         raise InputError(
