@@ -45,7 +45,11 @@ def test_case_gives_condition_and_reference_in_si_units_and_radians():
         ('nose = "cone"', 'nose = "blunt"', r"shape\.nose: is 'blunt'; allowed: 'cone' or 'tangent_ogive'"),
         ("[vehicle]", "[vehcile]", r"f\.toml: vehcile: unknown key; did you mean 'vehicle'"),
         ("axial_inertia_kg_m2 = 1.92e-4", "axial_inertia_kg_m2 = 1.0", r"vehicle\.axial_inertia_kg_m2: no body has it"),
-        ("initial_alpha_deg = 2.5\ninitial_beta_deg = 1.5", "initial_alpha_deg = 0.0", r"flight\.initial_alpha_deg: is 0"),
+        (
+            "initial_alpha_deg = 2.5\ninitial_beta_deg = 1.5",
+            "initial_alpha_deg = 0.0",
+            r"flight\.initial_alpha_deg: is 0",
+        ),
         ("seed = 1", "seed = 1.5", r"range\.seed: is 1\.5; allowed: a whole number"),
     ],
 )
