@@ -11,7 +11,7 @@ import numpy as np
 
 from indicial.conventions import COEFFICIENTS, Array, ReferenceQuantities, flow_angles, reduced_time
 from indicial.errors import InputError
-from indicial.files import atomic_path
+from indicial.files import read_netcdf, write_netcdf
 from indicial.motion import FlightCondition
 
 if TYPE_CHECKING:
@@ -114,8 +114,7 @@ class History:
 
     def to_netcdf(self, path: str | Path) -> None:
         """Write a netCDF-4 file in one step."""
-        with atomic_path(path) as temporary:
-            self.to_dataset().to_netcdf(temporary, engine="h5netcdf")
+        write_netcdf(path, self.to_dataset())
 
     @classmethod
     def from_netcdf(cls, path: str | Path) -> Self:
@@ -126,15 +125,7 @@ class History:
         InputError
             If the file is missing or not an indicial history.
         """
-        import xarray as xr
-
-        if not Path(path).is_file():
-            raise InputError(f"{path}: no such history file")
-        try:
-            with xr.open_dataset(path, engine="h5netcdf") as opened:
-                data = opened.load()
-        except (OSError, ValueError) as error:
-            raise InputError(f"{path}: not a netCDF file ({error})") from error
+        data = read_netcdf(path, "history file")
         if data.attrs.get("format") != "indicial history" or int(data.attrs["schema_version"]) != SCHEMA_VERSION:
             raise InputError(f"{path}: not an indicial history of schema version {SCHEMA_VERSION}")
         return cls(

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from indicial.conventions import COEFFICIENTS, Array, ReferenceQuantities, flow_angles
 from indicial.errors import InputError
-from indicial.files import atomic_path, write_text
+from indicial.files import read_netcdf, write_netcdf, write_text
 from indicial.flightsim.attitude import euler_angles, matrix_from_quaternion
 
 if TYPE_CHECKING:
@@ -244,8 +244,7 @@ class Trajectory:
 
     def to_netcdf(self, path: str | Path) -> None:
         """Write a netCDF-4 file in one step."""
-        with atomic_path(path) as temporary:
-            self.to_dataset().to_netcdf(temporary, engine="h5netcdf")
+        write_netcdf(path, self.to_dataset())
 
     @classmethod
     def from_netcdf(cls, path: str | Path) -> Self:
@@ -256,15 +255,7 @@ class Trajectory:
         InputError
             If the file is missing or not an indicial trajectory.
         """
-        import xarray as xr
-
-        if not Path(path).is_file():
-            raise InputError(f"{path}: no such trajectory file")
-        try:
-            with xr.open_dataset(path, engine="h5netcdf") as opened:
-                data = opened.load()
-        except (OSError, ValueError) as error:
-            raise InputError(f"{path}: not a netCDF file ({error})") from error
+        data = read_netcdf(path, "trajectory file")
         header = _checked_header(dict(data.attrs), path)
         names = ("time", *_COLUMNS, "density", "speed_of_sound", "lag", "outside_range")
         values: dict[str, Any] = {name: data[name].values for name in names}

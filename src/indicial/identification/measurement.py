@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from indicial.conventions import Array
 from indicial.errors import InputError
-from indicial.files import atomic_path, write_text
+from indicial.files import read_netcdf, write_netcdf, write_text
 from indicial.flightsim import Trajectory
 
 if TYPE_CHECKING:
@@ -152,8 +152,7 @@ class RangeRecord:
 
     def to_netcdf(self, path: str | Path) -> None:
         """Write a netCDF-4 file in one step."""
-        with atomic_path(path) as temporary:
-            self.to_dataset().to_netcdf(temporary, engine="h5netcdf")
+        write_netcdf(path, self.to_dataset())
 
     @classmethod
     def from_netcdf(cls, path: str | Path) -> Self:
@@ -164,15 +163,7 @@ class RangeRecord:
         InputError
             If the file is missing or not a range record.
         """
-        import xarray as xr
-
-        if not Path(path).is_file():
-            raise InputError(f"{path}: no such range record")
-        try:
-            with xr.open_dataset(path, engine="h5netcdf") as opened:
-                data = opened.load()
-        except (OSError, ValueError) as error:
-            raise InputError(f"{path}: not a netCDF file ({error})") from error
+        data = read_netcdf(path, "range record")
         columns = {str(name): data[name].values for name in data.data_vars}
         return cls._from_columns(columns, _checked_header(dict(data.attrs), path, None), path)
 

@@ -13,7 +13,7 @@ from scipy.interpolate import PchipInterpolator, PPoly
 
 from indicial.conventions import COEFFICIENTS, Array, ReferenceQuantities
 from indicial.errors import InputError, NoLimitError
-from indicial.files import atomic_path
+from indicial.files import read_netcdf, write_netcdf
 from indicial.history import History
 from indicial.motion import FlightCondition
 from indicial.rom.deficiency import deficiency_integral
@@ -251,8 +251,7 @@ class StepResponses:
 
     def to_netcdf(self, path: str | Path) -> None:
         """Write a netCDF-4 file in one step."""
-        with atomic_path(path) as temporary:
-            self.to_dataset().to_netcdf(temporary, engine="h5netcdf")
+        write_netcdf(path, self.to_dataset())
 
     @classmethod
     def from_netcdf(cls, path: str | Path) -> Self:
@@ -328,15 +327,7 @@ def _averaged(name: str, runs: list[tuple[Array, Array]]) -> StepResponse:
 
 def read_dataset(path: str | Path, format_: str, version: int) -> xarray.Dataset:
     """Open one of the package's netCDF files, or say what is wrong with it."""
-    import xarray as xr
-
-    if not Path(path).is_file():
-        raise InputError(f"{path}: no such file")
-    try:
-        with xr.open_dataset(path, engine="h5netcdf") as opened:
-            data = opened.load()
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: not a netCDF file ({error})") from error
+    data = read_netcdf(path, "file")
     if data.attrs.get("format") != format_ or int(data.attrs["schema_version"]) != version:
         raise InputError(f"{path}: not a file of {format_}, schema version {version}")
     return data

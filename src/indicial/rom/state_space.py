@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from indicial.conventions import COEFFICIENTS, Array, ReferenceQuantities
 from indicial.errors import InputError
-from indicial.files import atomic_path, write_text
+from indicial.files import write_netcdf, write_text
 from indicial.motion import FlightCondition
 from indicial.rom.model import ComplexArray, ReducedModel
 from indicial.rom.response import StepResponse, StepResponses, read_dataset
@@ -265,8 +265,7 @@ class StateSpaceModel(ReducedModel):
 
     def to_netcdf(self, path: str | Path) -> None:
         """Write a netCDF-4 file in one step."""
-        with atomic_path(path) as temporary:
-            self.to_dataset().to_netcdf(temporary, engine="h5netcdf")
+        write_netcdf(path, self.to_dataset())
 
     @classmethod
     def from_netcdf(cls, path: str | Path) -> Self:
