@@ -44,9 +44,9 @@ def test_cone_loads_equal_conical_flow_theory(mach: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("coarse", "fine", "allowed"), [(0.5, 1.0, 0.03), pytest.param(1.0, 2.0, 0.01, marks=pytest.mark.slow)]
+    ("mach", "coarse", "fine", "allowed"),
+    [(2.0, 0.5, 1.0, 0.03), (3.0, 0.5, 1.0, 0.03), pytest.param(2.0, 1.0, 2.0, 0.01, marks=pytest.mark.slow)],
 )
-@pytest.mark.parametrize("mach", [2.0, 3.0])
 def test_cone_loads_converge_to_theory_with_second_order(
     mach: float, coarse: float, fine: float, allowed: float
 ) -> None:
