@@ -146,7 +146,10 @@ def _iterate(
         norm_trial = float(np.linalg.norm(r_trial)) / scale
         log.debug("residual %.2e, CFL %.1e, %d products", norm_trial, cfl, solution.products)
         if np.isfinite(norm_trial) and norm_trial < 3.0 * norm:
-            cfl = min(cfl * float(np.clip(norm / norm_trial, 0.3, 8.0)) * 1.2, _NEWTON_CFL)
+            # a step that the linear solver could not finish was too long
+            solved = solution.relative_residual <= forcing
+            cfl *= 1.2 * float(np.clip(norm / norm_trial, 0.3, 8.0)) if solved else 0.3
+            cfl = min(cfl, _NEWTON_CFL)
             q, r, norm = trial, r_trial, norm_trial
             norms.append(norm)
             if progress is not None:
