@@ -66,7 +66,7 @@ def error(n: int) -> float:
 
 @pytest.mark.parametrize(("coarse", "least"), [(24, 1.75), pytest.param(48, 2.0, marks=pytest.mark.slow)])
 def test_a_vortex_in_still_air_is_kept_with_second_order_under_motion_and_turning(coarse: int, least: float) -> None:
-    """At least second order; on these meshes, of two to nine cells a vortex radius, the rate seen still rises past 2."""
+    """At least second order: on these meshes, of two to nine cells a vortex radius, the rate still rises past 2."""
     order = np.log2(error(coarse) / error(2 * coarse))
     print(order)
     assert least < order < 3.0
