@@ -1,11 +1,11 @@
-"""The protocol that every solver satisfies: finite volumes, lattice, a ROM, exact theory."""
+"""The protocols of solvers (finite volumes, lattice, a ROM, exact theory) and of flows linearised about a state."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from indicial.conventions import COEFFICIENTS, Array, ReferenceQuantities
 from indicial.history import History
@@ -57,4 +57,76 @@ class Solver(Protocol):
 
     def unsteady(self, condition: FlightCondition, motion: Motion, times: ArrayLike) -> History:
         """Loads at `times` [s] under `motion`."""
+        ...
+
+
+class LinearisedFlow(Protocol):
+    r"""``E dx/ds + J x = -B u``, ``loads - baseline = C x + D u``, in reduced time ``s = 2Vt/c``.
+
+    ``H(ik) = D - C (ik E + J)^{-1} B`` from the inputs u, deviations from `condition`, to the loads.
+
+    Attributes
+    ----------
+    condition : FlightCondition
+    reference : ReferenceQuantities
+        Makes loads and rates dimensionless.
+    baseline : ndarray
+        (CA, CY, CN, Cl, Cm, Cn) of the steady state, shape (6,).
+    inputs : tuple of str
+        Of alpha, beta [rad] and p, q, r (dimensionless by `reference`).
+    outputs : tuple of str
+        Of the six coefficients.
+    b, c, d : ndarray
+        Real, shapes (n, n_inputs), (n_outputs, n), (n_outputs, n_inputs); n unknowns.
+    """
+
+    @property
+    def condition(self) -> FlightCondition: ...
+
+    @property
+    def reference(self) -> ReferenceQuantities: ...
+
+    @property
+    def baseline(self) -> Array: ...
+
+    @property
+    def inputs(self) -> tuple[str, ...]: ...
+
+    @property
+    def outputs(self) -> tuple[str, ...]: ...
+
+    @property
+    def b(self) -> Array: ...
+
+    @property
+    def c(self) -> Array: ...
+
+    @property
+    def d(self) -> Array: ...
+
+    def apply(self, x: NDArray[Any], *, transposed: bool = False) -> NDArray[Any]:
+        """``J x``, or ``J^T x``; x real or complex, shape (n,)."""
+        ...
+
+    def apply_mass(self, x: NDArray[Any], *, transposed: bool = False) -> NDArray[Any]:
+        """``E x``, or ``E^T x``; E is block diagonal, not symmetric."""
+        ...
+
+    def solve(
+        self,
+        rhs: NDArray[Any],
+        shift: complex = 0.0,
+        *,
+        transposed: bool = False,
+        start: NDArray[Any] | None = None,
+    ) -> NDArray[Any]:
+        """x with ``(shift E + J) x = rhs``, or with the plain transpose (not the conjugate one), shape (n,).
+
+        Real for real `shift` and `rhs`, else complex; iterative from `start`, to a stated relative tolerance.
+
+        Raises
+        ------
+        DivergenceError
+            If the tolerance is not reached.
+        """
         ...
