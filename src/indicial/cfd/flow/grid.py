@@ -17,7 +17,7 @@ MOST_SKEWED = 1.0
 """Distance of a face's centre off the line of its cells' centres, over their distance, beyond which both cells carry
 no gradient: their scheme is of first order. Only the slivers round a sharp nose tip are so skewed."""
 
-KINDS = {"wall": SLIP_WALL, "farfield": FARFIELD, "outflow": OUTFLOW, "symmetry": SYMMETRY}
+KINDS = {"wall": SLIP_WALL, "sting": SLIP_WALL, "farfield": FARFIELD, "outflow": OUTFLOW, "symmetry": SYMMETRY}
 
 
 @dataclass(frozen=True)

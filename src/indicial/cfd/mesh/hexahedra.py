@@ -30,7 +30,7 @@ class PatchSides:
     Parameters
     ----------
     name : str
-    kind : {"wall", "no_slip_wall", "farfield", "outflow", "symmetry"}
+    kind : {"wall", "no_slip_wall", "sting", "farfield", "outflow", "symmetry"}
     cells, sides : int arrays of one shape
         Cell numbers and their sides 0..5 (`SIDE_NODES`). A side collapsed to a line or a point is left out.
     """

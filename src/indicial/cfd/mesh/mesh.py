@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from indicial.cfd.mesh.hexahedra import PatchSides
     from indicial.cfd.mesh.quality import MeshReport
 
-PatchKind = Literal["wall", "no_slip_wall", "farfield", "outflow", "symmetry"]
+PatchKind = Literal["wall", "no_slip_wall", "sting", "farfield", "outflow", "symmetry"]
 PATCH_KINDS: tuple[PatchKind, ...] = get_args(PatchKind)
+"""Loads count on walls only. A "sting" is a slip wall that is no part of the body: a support that stands for a wake."""
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from indicial.files import write_text
 _OPENFOAM_TYPE: dict[str, str] = {
     "wall": "wall",
     "no_slip_wall": "wall",
+    "sting": "wall",
     "farfield": "patch",
     "outflow": "patch",
     "symmetry": "symmetry",
@@ -21,7 +22,7 @@ _OPENFOAM_TYPE: dict[str, str] = {
 def write_polymesh(mesh: Mesh, folder: str | Path) -> None:
     """Write ``points``, ``faces``, ``owner``, ``neighbour`` and ``boundary`` into `folder`, in ASCII.
 
-    Walls become ``wall``, symmetry planes ``symmetry``, the rest ``patch``; names are kept.
+    Walls and stings become ``wall``, symmetry planes ``symmetry``, the rest ``patch``; names are kept.
     """
     target = Path(folder)
     note = f"nPoints:{mesh.n_points} nCells:{mesh.n_cells} nFaces:{mesh.n_faces} nInternalFaces:{mesh.n_interior}"
