@@ -1,7 +1,8 @@
 r"""Incomplete block factorisation of the compact Jacobian, on its own pattern: block ILU(0).
 
 The preconditioner of every implicit solve. With cells numbered downstream it is nearly a direct solver where the
-flow is supersonic. Factors are kept in single precision: they only precondition.
+flow is supersonic. Factors are kept in single precision: they only precondition. Blocks may be complex (a matrix
+shifted by i omega), right-hand sides too.
 """
 
 from __future__ import annotations
@@ -10,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from indicial.cfd.flow.grid import Grid
-from indicial.conventions import Array, Index
+from indicial.cfd.march.krylov import State
+from indicial.conventions import Index
 from indicial.errors import DivergenceError
 
 
@@ -56,7 +57,7 @@ class Pattern:
 @njit(cache=True, error_model="numpy")
 def _invert(a, out):  # type: ignore[no-untyped-def]
     """Inverse of a 5 x 5 block by Gauss-Jordan with partial pivoting; false if it is singular."""
-    m = np.empty((5, 5))
+    m = np.empty((5, 5), dtype=a.dtype)
     for i in range(5):
         for j in range(5):
             m[i, j] = a[i, j]
@@ -92,8 +93,8 @@ def _factorise(blocks, indptr, indices, diagonal):  # type: ignore[no-untyped-de
     n = indptr.shape[0] - 1
     place = np.empty(n, dtype=np.int32)
     place[:] = -1
-    product = np.empty((5, 5))
-    inverse = np.empty((5, 5))
+    product = np.empty((5, 5), dtype=blocks.dtype)
+    inverse = np.empty((5, 5), dtype=blocks.dtype)
     for i in range(n):
         for s in range(indptr[i], indptr[i + 1]):
             place[indices[s]] = s
@@ -160,8 +161,38 @@ def _solve(blocks, indptr, indices, diagonal, b, x):  # type: ignore[no-untyped-
             x[i, a] = d[a, 0] * y0 + d[a, 1] * y1 + d[a, 2] * y2 + d[a, 3] * y3 + d[a, 4] * y4
 
 
+@njit(cache=True, error_model="numpy", fastmath=True)
+def _solve_transposed(blocks, indptr, indices, diagonal, x):  # type: ignore[no-untyped-def]
+    """x = L^-T U^-T x in place: rows of the factors are columns of their transposes, so each row is scattered."""
+    n = indptr.shape[0] - 1
+    for i in range(n):
+        y0, y1, y2, y3, y4 = x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4]
+        d = blocks[diagonal[i]]
+        for a in range(5):
+            x[i, a] = d[0, a] * y0 + d[1, a] * y1 + d[2, a] * y2 + d[3, a] * y3 + d[4, a] * y4
+        y0, y1, y2, y3, y4 = x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4]
+        for s in range(diagonal[i] + 1, indptr[i + 1]):
+            j = indices[s]
+            u = blocks[s]
+            for a in range(5):
+                x[j, a] -= u[0, a] * y0 + u[1, a] * y1 + u[2, a] * y2 + u[3, a] * y3 + u[4, a] * y4
+    for i in range(n - 1, -1, -1):
+        y0, y1, y2, y3, y4 = x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4]
+        for s in range(indptr[i], diagonal[i]):
+            j = indices[s]
+            u = blocks[s]
+            for a in range(5):
+                x[j, a] -= u[0, a] * y0 + u[1, a] * y1 + u[2, a] * y2 + u[3, a] * y3 + u[4, a] * y4
+
+
 class BlockILU:
-    """``M^-1`` of a block-sparse matrix, applied to states (nc, 5).
+    """``M^-1`` of a block-sparse matrix, real or complex, applied to real or complex states (nc, 5).
+
+    Parameters
+    ----------
+    pattern : Pattern
+    blocks : ndarray
+        (entries, 5, 5), in the pattern's order; overwritten by the factors.
 
     Raises
     ------
@@ -169,16 +200,23 @@ class BlockILU:
         If a diagonal block becomes singular.
     """
 
-    def __init__(self, pattern: Pattern, blocks: Array) -> None:
+    def __init__(self, pattern: Pattern, blocks: State) -> None:
         self.pattern = pattern
         row = _factorise(blocks, pattern.indptr, pattern.indices, pattern.diagonal)
         if row >= 0:
             raise DivergenceError(f"the linearised equations of cell {row} are singular", cell=row)
-        self._factors: NDArray[np.float32] = blocks.astype(np.float32)
+        self._factors = blocks.astype(np.complex64 if np.iscomplexobj(blocks) else np.float32)
 
-    def solve(self, b: Array) -> Array:
-        """``M^-1 b``."""
-        x = np.empty_like(b)
+    def solve(self, b: State) -> State:
+        """``M^-1 b``, complex if M or b is."""
+        x = np.empty(b.shape, dtype=np.result_type(self._factors, b))
         p = self.pattern
         _solve(self._factors, p.indptr, p.indices, p.diagonal, b, x)
+        return x
+
+    def solve_transposed(self, b: State) -> State:
+        """``M^-T b``: the transpose, nothing conjugated."""
+        x = b.astype(np.result_type(self._factors, b))
+        p = self.pattern
+        _solve_transposed(self._factors, p.indptr, p.indices, p.diagonal, x)
         return x
