@@ -68,7 +68,7 @@ def test_gradients_of_linear_fields_are_exact_on_a_skewed_mesh(skewed: Mesh) -> 
     slope = np.random.default_rng(2).standard_normal((5, 3))
     q = 1.0 + skewed.cell_centre @ slope.T
     out = np.empty((grid.n_cells, 5, 3))
-    gradients(q, grid.offsets, grid.cells, grid.weights, out)
+    gradients(q, grid.offsets, grid.faces, grid.cells, grid.weights, grid.normal, 1.0, out)
     assert np.max(np.abs(out - slope)) < 1e-11
 
 

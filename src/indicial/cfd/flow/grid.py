@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ SLIP_WALL, FARFIELD, OUTFLOW, SYMMETRY = range(4)
 MOST_SKEWED = 1.0
 """Distance of a face's centre off the line of its cells' centres, over their distance, beyond which both cells carry
 no gradient: their scheme is of first order. Only the slivers round a sharp nose tip are so skewed."""
+
+MIRROR = -2
+"""Stands for a neighbour in the cell-to-face table: the cell's own mirror image behind a symmetry plane."""
 
 KINDS = {"wall": SLIP_WALL, "sting": SLIP_WALL, "farfield": FARFIELD, "outflow": OUTFLOW, "symmetry": SYMMETRY}
 
@@ -37,10 +41,10 @@ class Grid:
     volume : ndarray
         (nc,).
     offsets, faces, signs, cells, weights : ndarray
-        Cell-to-face table in rows: face, +1 where the cell owns it else -1, neighbour cell or -1, and the
-        least-squares weight of that neighbour.
+        Cell-to-face table in rows: face, +1 where the cell owns it else -1, neighbour cell, MIRROR for the cell's own
+        image behind a symmetry plane or -1, and the least-squares weight of that neighbour.
     softening : ndarray
-        The limiter's eps of each interior face (ni,).
+        The limiter's eps of each face that has a neighbour or an image behind it, else 0 (nf,).
     wall_faces : ndarray
         Faces whose loads count.
     """
@@ -71,6 +75,15 @@ class Grid:
     def n_interior(self) -> int:
         """Number of interior faces."""
         return len(self.neighbour)
+
+    @cached_property
+    def twins(self) -> Index:
+        """Where the cell-to-face table holds the same face in the neighbour's row, -1 for boundary faces (entries,)."""
+        paired = np.flatnonzero(self.cells >= 0)
+        order = paired[np.argsort(self.faces[paired], kind="stable")]
+        out = np.full(len(self.faces), -1, dtype=np.int32)
+        out[order[0::2]], out[order[1::2]] = order[1::2], order[0::2]
+        return out
 
     @classmethod
     def from_mesh(cls, mesh: Mesh, reference: ReferenceQuantities) -> Grid:
@@ -104,20 +117,25 @@ class Grid:
         sign = np.concatenate([np.ones(mesh.n_faces), -np.ones(ni)])[order].astype(np.int8)
         other = np.concatenate([neighbour, np.full(mesh.n_faces - ni, -1), owner[:ni]])[order]
         centres = mesh.cell_centre / c
-        weights = least_squares_weights(centres, offsets, other)
+        normal = mesh.face_area / area[:, None]
         to_owner = mesh.face_centre / c - centres[owner]
-        step = centres[neighbour] - centres[owner[:ni]]
-        h = np.linalg.norm(step, axis=1)
-        skewed = _skewness(to_owner[:ni], step) > MOST_SKEWED
+        step = np.zeros((mesh.n_faces, 3))
+        step[:ni] = centres[neighbour] - centres[owner[:ni]]
+        mirrors = ni + np.flatnonzero(kind == SYMMETRY)
+        step[mirrors] = 2.0 * np.sum(to_owner * normal, axis=1)[mirrors, None] * normal[mirrors]
+        other[np.isin(face, mirrors)] = MIRROR
+        weights = least_squares_weights(sign[:, None] * step[face], offsets)
+        paired = np.concatenate([np.arange(ni), mirrors])
+        skewed = paired[_skewness(to_owner[paired], step[paired]) > MOST_SKEWED]
         plain = np.zeros(mesh.n_cells, dtype=bool)
-        plain[owner[:ni][skewed]] = plain[neighbour[skewed]] = True
+        plain[owner[skewed]] = plain[neighbour[skewed[skewed < ni]]] = True
         weights[np.repeat(plain, np.diff(offsets))] = 0.0
         walls = [np.arange(p.start, p.stop) for p in mesh.patches if p.kind == "wall"]
         return cls(
             owner=owner.astype(np.int32),
             neighbour=neighbour.astype(np.int32),
             kind=kind,
-            normal=mesh.face_area / area[:, None],
+            normal=normal,
             area=area / c**2,
             moment=(mesh.face_moment - np.cross(origin, mesh.face_area)) / c**3,
             to_owner=to_owner,
@@ -128,7 +146,7 @@ class Grid:
             signs=sign,
             cells=other.astype(np.int32),
             weights=weights,
-            softening=h**3,
+            softening=np.linalg.norm(step, axis=1) ** 3,
             wall_faces=np.concatenate(walls).astype(np.int32) if walls else np.empty(0, dtype=np.int32),
         )
 

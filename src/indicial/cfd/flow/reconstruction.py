@@ -30,31 +30,29 @@ UNRESOLVED = 0.03
 a gradient is taken; below it small differences would be blown up and the scheme is unstable."""
 
 
-def least_squares_weights(centres: Array, offsets: Index, cells: Index) -> Array:
+def least_squares_weights(steps: Array, offsets: Index) -> Array:
     """Weights w of ``grad q = sum_k w_k (q_k - q)`` over face neighbours, exact for linear fields.
 
     Parameters
     ----------
-    centres : ndarray
-        Cell centres (nc, 3).
-    offsets, cells : ndarray
-        Rows of the cell-to-face table: neighbour cell of each entry, -1 on the boundary.
+    steps : ndarray
+        From each cell's centre to that of its neighbour, in rows (entries, 3); zero where there is none.
+    offsets : ndarray
+        Rows of the cell-to-face table.
 
     Returns
     -------
     ndarray
-        (entries, 3), zero on boundary entries. Directions in which a cell has next to no neighbours (the thickness
-        of a one-layer mesh, the height of a thin prism) get no gradient.
+        (entries, 3), zero on boundary entries. Directions in which a cell has next to no neighbours (the height of a
+        thin prism) get no gradient.
     """
     rows = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
-    inside = cells >= 0
-    d = np.where(inside[:, None], centres[cells] - centres[rows], 0.0)
-    square = np.sum(d * d, axis=1)
+    square = np.sum(steps * steps, axis=1)
     w = np.divide(1.0, square, out=np.zeros_like(square), where=square > 0.0)
     normal = np.zeros((len(offsets) - 1, 3, 3))
-    np.add.at(normal, rows, w[:, None, None] * d[:, :, None] * d[:, None, :])
+    np.add.at(normal, rows, w[:, None, None] * steps[:, :, None] * steps[:, None, :])
     inverse = np.linalg.pinv(normal, rcond=UNRESOLVED, hermitian=True)
-    weights: Array = np.einsum("nij,nj->ni", inverse[rows], w[:, None] * d)
+    weights: Array = np.einsum("nij,nj->ni", inverse[rows], w[:, None] * steps)
     return weights
 
 

@@ -5,7 +5,9 @@ In body (mesh) axes, v the absolute velocity and ``u_g = V_b + omega x r`` the m
     V dW/dt + R = 0,   R = sum_f [ W (v.n - u_g.n) + p (0, n, v.n) ] A + V omega x (rho v).
 
 The volume swept by a face is exactly ``V_b.A_f + omega.M_f``, so still air has R = 0 to round-off under any
-motion. Viscous fluxes will join the convective ones face by face: the cells' gradients are at hand there.
+motion. A cell on a symmetry plane has its own mirror image for a neighbour, so half a body gives to round-off what
+the whole one gives; no motion may cross such a plane. Viscous fluxes will join the convective ones face by face: the
+cells' gradients are at hand there.
 """
 
 from __future__ import annotations
@@ -17,24 +19,43 @@ from numba import njit, prange
 
 from indicial.cfd.flow.flux import hllc, physical_flux, wall_flux
 from indicial.cfd.flow.gas import STILL_AIR
-from indicial.cfd.flow.grid import FARFIELD, OUTFLOW, Grid
+from indicial.cfd.flow.grid import FARFIELD, MIRROR, OUTFLOW, SYMMETRY, Grid
 from indicial.cfd.flow.reconstruction import limiter, saturate
 from indicial.conventions import Array
 
 
+@njit(cache=True, error_model="numpy")
+def mirrored(u, v, w, nx, ny, nz):  # type: ignore[no-untyped-def]
+    """A velocity reflected in a plane of unit normal n."""
+    t = 2.0 * (u * nx + v * ny + w * nz)
+    return u - t * nx, v - t * ny, w - t * nz
+
+
 @njit(cache=True, parallel=True, error_model="numpy")
-def gradients(q, offsets, cells, weights, out):  # type: ignore[no-untyped-def]
-    """Least-squares gradients of every variable, out (nc, 5, 3)."""
+def gradients(q, offsets, faces, cells, weights, normal, parity, out):  # type: ignore[no-untyped-def]
+    """Least-squares gradients of every variable, out (nc, 5, 3).
+
+    `parity` is the sign of the images behind symmetry planes: 1, or -1 for an antisymmetric disturbance.
+    """
     for c in prange(q.shape[0]):
         for k in range(5):
             for x in range(3):
                 out[c, k, x] = 0.0
         for e in range(offsets[c], offsets[c + 1]):
             n = cells[e]
+            wx, wy, wz = weights[e, 0], weights[e, 1], weights[e, 2]
             if n >= 0:
-                wx, wy, wz = weights[e, 0], weights[e, 1], weights[e, 2]
                 for k in range(5):
                     dq = q[n, k] - q[c, k]
+                    out[c, k, 0] += wx * dq
+                    out[c, k, 1] += wy * dq
+                    out[c, k, 2] += wz * dq
+            elif n == MIRROR:
+                m = normal[faces[e]]
+                u, v, w = mirrored(q[c, 1], q[c, 2], q[c, 3], m[0], m[1], m[2])
+                image = (q[c, 0], u, v, w, q[c, 4])
+                for k in range(5):
+                    dq = parity * image[k] - q[c, k]
                     out[c, k, 0] += wx * dq
                     out[c, k, 1] += wy * dq
                     out[c, k, 2] += wz * dq
@@ -74,7 +95,7 @@ def _boundary_state(q, g, rx, ry, rz):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def boundary_flux(kind, r, u, v, w, p, far, nx, ny, nz, ug):  # type: ignore[no-untyped-def]
-    """Flux through a boundary face; symmetry planes are slip walls whose loads do not count."""
+    """Flux through a boundary face with nothing behind it."""
     if kind == FARFIELD:
         return hllc(r, u, v, w, p, far[0], far[1], far[2], far[3], far[4], nx, ny, nz, ug)
     if kind == OUTFLOW:
@@ -100,6 +121,13 @@ def _face_fluxes(q, g, velocity, omega, owner, neighbour, kind, normal, area, mo
             rl, ul, vl, wl, pl = _face_state(q[i], q[j], g[i], rx, ry, rz, dx, dy, dz, e)
             rr, ur, vr, wr, pr = _face_state(q[j], q[i], g[j], sx, sy, sz, -dx, -dy, -dz, e)
             f0, f1, f2, f3, f4 = hllc(rl, ul, vl, wl, pl, rr, ur, vr, wr, pr, nx, ny, nz, ug)
+        elif kind[f - ni] == SYMMETRY:
+            d = 2.0 * (rx * nx + ry * ny + rz * nz)
+            u, v, w = mirrored(q[i, 1], q[i, 2], q[i, 3], nx, ny, nz)
+            image = (q[i, 0], u, v, w, q[i, 4])
+            rl, ul, vl, wl, pl = _face_state(q[i], image, g[i], rx, ry, rz, d * nx, d * ny, d * nz, eps[f])
+            ur, vr, wr = mirrored(ul, vl, wl, nx, ny, nz)
+            f0, f1, f2, f3, f4 = hllc(rl, ul, vl, wl, pl, rl, ur, vr, wr, pl, nx, ny, nz, ug)
         else:
             rl, ul, vl, wl, pl = _boundary_state(q[i], g[i], rx, ry, rz)
             f0, f1, f2, f3, f4 = boundary_flux(kind[f - ni], rl, ul, vl, wl, pl, far, nx, ny, nz, ug)
@@ -158,8 +186,15 @@ class Residual:
         self.face_flux: Array = np.empty((len(grid.owner), 5))
 
     def __call__(self, q: Array, motion: MeshMotion) -> Array:
-        """R, shape (nc, 5); leaves the face fluxes in `face_flux`."""
+        """R, shape (nc, 5); leaves the face fluxes in `face_flux`.
+
+        A complex q or motion gives a complex R, for derivatives by the complex step.
+        """
         g = self.grid
+        dtype = np.result_type(q, motion.velocity, motion.omega)
+        if self.face_flux.dtype != dtype:
+            self.gradient, self.face_flux = self.gradient.astype(dtype), self.face_flux.astype(dtype)
+        q = q.astype(dtype, copy=False)
         self.update_gradient(q)
         _face_fluxes(
             q,
@@ -178,7 +213,7 @@ class Residual:
             self.far,
             self.face_flux,
         )
-        out = np.empty((g.n_cells, 5))
+        out = np.empty((g.n_cells, 5), dtype)
         gather(self.face_flux, g.offsets, g.faces, g.signs, out)
         if np.any(motion.omega):
             momentum = (g.volume * q[:, 0])[:, None] * q[:, 1:4]
@@ -188,7 +223,8 @@ class Residual:
     def update_gradient(self, q: Array) -> None:
         """Gradients of q into `gradient`."""
         if self.second_order:
-            gradients(q, self.grid.offsets, self.grid.cells, self.grid.weights, self.gradient)
+            g = self.grid
+            gradients(q, g.offsets, g.faces, g.cells, g.weights, g.normal, 1.0, self.gradient)
         else:
             self.gradient[:] = 0.0
 
