@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from indicial.cfd.mesh import RESOLUTIONS, cone_mesh, finned_body_mesh
+from indicial.cfd.mesh import RESOLUTIONS, WideDomain, cone_mesh, finned_body_mesh
 from indicial.cfd.mesh.bow_shock import shock_angle
 from indicial.cfd.shapes import Cone, FinnedBody, FinSet, Nose
 from indicial.errors import InputError
@@ -21,6 +21,7 @@ DELTA = FinSet(
 )
 PLATES = FinSet(3, 1.0, 1.0, 1.0, trailing_edge=8.5, section="plate", roll_deg=17.0)
 OGIVE = Nose("tangent_ogive", 3.0)
+DOMAIN = WideDomain()
 
 CASES = {
     "finner M1.5": (FINNER, {"mach": 1.5}),
@@ -36,6 +37,13 @@ CASES = {
     "no fins": (FinnedBody(0.1, OGIVE, 8.0), {"mach": 2.0, "sector": "full"}),
     "cone": (Cone(10.0).body(), {"mach": 2.0, "sector": "quarter"}),
     "wide cone": (Cone(25.0).body(), {"mach": 2.5}),
+    "sting": (FINNER, {"wake": "sting"}),
+    "sting full": (FINNER, {"wake": "sting", "sector": "full"}),
+    "sting quarter": (FINNER, {"wake": "sting", "sector": "quarter"}),
+    "double wedge sting": (FinnedBody(0.1, OGIVE, 10.0, DOUBLE_WEDGE), {"wake": "sting"}),
+    "delta sting": (FinnedBody(0.1, Nose("cone", 3.0), 11.0, DELTA), {"wake": "sting"}),
+    "three plates sting": (FinnedBody(0.1, OGIVE, 9.0, PLATES), {"wake": "sting", "sector": "full"}),
+    "no fins sting": (FinnedBody(0.1, OGIVE, 8.0), {"wake": "sting", "sector": "full"}),
 }
 
 
@@ -99,7 +107,9 @@ def test_cells_are_numbered_downstream(case):
     assert np.all(axial[np.abs(axial) > 0.9] > 0.0)
 
 
-@pytest.mark.parametrize("case", ["finner M2", "finner full", "finner rolled", "finner +", "finner quarter"])
+@pytest.mark.parametrize(
+    "case", ["finner M2", "finner full", "finner rolled", "finner +", "finner quarter", "sting", "sting full"]
+)
 def test_finner_fins_have_their_exact_planform_wedge_and_tip(case):
     mesh, body = made(case), CASES[case][0]
     names = [p.name for p in mesh.patches if p.name.startswith("fin")]
@@ -128,9 +138,10 @@ def test_finner_fins_have_their_exact_planform_wedge_and_tip(case):
         assert area[~tip & (area[:, 2] > 0.0), 2].sum() == pytest.approx(exact, rel=1e-5)
 
 
+@pytest.mark.parametrize("wake", ["", " sting"])
 @pytest.mark.parametrize(("case", "fins"), [("double wedge", DOUBLE_WEDGE), ("delta", DELTA), ("three plates", PLATES)])
-def test_other_fins_have_their_planform_and_section(case, fins):
-    mesh, body = made(case), CASES[case][0]
+def test_other_fins_have_their_planform_and_section(case, fins, wake):
+    mesh, body = made(case + wake), CASES[case + wake][0]
     nodes = fin_axes(mesh, patch_nodes(mesh, "fin1") / body.diameter, fins.angles[0])
     fraction = (nodes[:, 1] - 0.5) / fins.span
     chordwise = (nodes[:, 0] - fins.leading_edge(fraction)) / fins.chord(fraction)
@@ -149,6 +160,47 @@ def test_body_nodes_lie_on_the_body():
         assert np.hypot(nodes[:, 1], nodes[:, 2]) == pytest.approx(body.radius(nodes[:, 0]), abs=1e-13)
         assert nodes[:, 0].min() == 0.0
         assert nodes[:, 0].max() == pytest.approx(body.length)
+
+
+def test_a_sting_goes_on_from_the_body_and_a_needle_leads_to_it():
+    for case in ("sting", "double wedge sting", "delta sting", "no fins sting"):
+        mesh, body = made(case), CASES[case][0]
+        nodes = patch_nodes(mesh, "body") / body.diameter
+        assert np.hypot(nodes[:, 1], nodes[:, 2]) == pytest.approx(body.radius(nodes[:, 0]), abs=1e-13)
+        assert np.hypot(*nodes[nodes[:, 0] == nodes[:, 0].min()][:, 1:].T) == pytest.approx(DOMAIN.needle)
+        assert nodes[:, 0].max() == pytest.approx(body.length)
+        sting = patch_nodes(mesh, "sting") / body.diameter
+        radius = np.hypot(sting[:, 1], sting[:, 2])
+        ahead, behind = sting[:, 0] < 1.0, sting[:, 0] > body.length + 1e-9
+        assert radius[ahead] == pytest.approx(DOMAIN.needle)
+        assert radius[behind] == pytest.approx(0.5)
+        assert sting[:, 0].min() == pytest.approx(-DOMAIN.upstream)
+        assert sting[:, 0].max() == pytest.approx(body.length + DOMAIN.downstream)
+
+
+def test_the_flat_ends_of_wedge_fins_belong_to_the_sting():
+    """Walls then have the force in a constant pressure that they have without a wake, but for the nose's very tip."""
+    sting, none = made("sting"), made("finner M2")
+    area = {mesh: mesh.face_area[wall_faces(mesh, "fin1", "fin4")].sum(axis=0) for mesh in (sting, none)}
+    assert area[sting] == pytest.approx(area[none], abs=1e-12 * 0.03**2)
+    axial = {mesh: mesh.face_area[wall_faces(mesh, "body"), 0].sum() for mesh in (sting, none)}
+    tip = 0.5 * np.pi * DOMAIN.needle**2 * 0.03**2
+    assert axial[none] - axial[sting] == pytest.approx(tip, rel=0.02)
+    ends = sting.patch("sting").faces
+    flat = sting.face_area[ends][np.abs(sting.face_centre[ends, 0] - 0.3) < 1e-9]
+    chord_thickness = 0.08 * (1.5 - np.sqrt(0.25 - 0.04**2 / 3.0))
+    assert flat[:, 0].sum() == pytest.approx(-2.0 * chord_thickness * 0.03**2, rel=2e-3)
+
+
+def test_the_wide_domain_is_a_cylinder():
+    mesh = made("sting")
+    far = patch_nodes(mesh, "farfield") / 0.03
+    inside = (far[:, 0] > -DOMAIN.upstream + 1e-9) & (far[:, 0] < 10.0 + DOMAIN.downstream - 1e-9)
+    assert np.hypot(far[inside, 1], far[inside, 2]) == pytest.approx(DOMAIN.radius)
+    assert {p.name: p.kind for p in mesh.patches} == {
+        "body": "wall", "fin1": "wall", "fin4": "wall", "farfield": "farfield", "sting": "sting",
+        "symmetry": "symmetry",
+    }  # fmt: skip
 
 
 def test_cone_with_even_columns_has_the_volume_and_area_of_its_pyramid():
@@ -197,6 +249,7 @@ def test_half_mesh_is_its_own_mirror_image_in_z():
 def test_full_mesh_is_two_halves_and_does_not_depend_on_roll():
     half, full, rolled, quarter = (made(c) for c in ("finner M2", "finner full", "finner rolled", "finner quarter"))
     assert full.n_cells == 2 * half.n_cells == 4 * quarter.n_cells
+    assert made("sting full").n_cells == 2 * made("sting").n_cells == 4 * made("sting quarter").n_cells
     assert full.cell_volume.sum() == pytest.approx(2.0 * half.cell_volume.sum(), rel=1e-12)
     assert np.sort(full.cell_volume) == pytest.approx(np.sort(rolled.cell_volume), rel=1e-9)
     assert np.sort(full.cell_volume)[::2] == pytest.approx(np.sort(half.cell_volume), rel=1e-9)
@@ -262,6 +315,17 @@ def test_presets_refine_by_a_constant_ratio():
         (lambda: finned_body_mesh(FINNER, "quick", mach=0.9), "mach is 0.9, must be above 1"),
         (lambda: finned_body_mesh(Cone(40.0).body(), "quick", mach=1.5), "detached"),
         (lambda: finned_body_mesh(FINNER, "quick", mach=2.0, margin=0.9), "margin is 0.9"),
+        (lambda: finned_body_mesh(FINNER, "quick"), "mach is missing"),
+        (
+            lambda: finned_body_mesh(FINNER, "quick", mach=2.0, wake="free"),
+            "wake is 'free', must be one of none, sting",
+        ),
+        (lambda: WideDomain(upstream=0.0), "upstream is 0.0, must be positive"),
+        (
+            lambda: finned_body_mesh(FINNER, "quick", wake="sting", domain=WideDomain(radius=2.0)),
+            "radius is 2.0, must be above 3 calibres",
+        ),
+        (lambda: finned_body_mesh(FINNER, "quick", wake="sting", domain=WideDomain(needle=0.2)), "needle is 0.2"),
         (lambda: finned_body_mesh(FINNER, "quick", mach=2.0, sector="eighth"), "must be one of full, half, quarter"),
         (
             lambda: finned_body_mesh(FinnedBody.basic_finner(roll_deg=90.0), "quick", mach=2.0),

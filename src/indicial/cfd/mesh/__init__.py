@@ -1,6 +1,7 @@
 """The face-based mesh, its generators, its checks, reading and writing."""
 
 from indicial.cfd.mesh.airfoil import airfoil_mesh
+from indicial.cfd.mesh.body_frame import WideDomain
 from indicial.cfd.mesh.box import box_mesh
 from indicial.cfd.mesh.finned_body import RESOLUTIONS, Resolution, cone_mesh, finned_body_mesh
 from indicial.cfd.mesh.hexahedra import PatchSides
@@ -17,6 +18,7 @@ __all__ = [
     "PatchKind",
     "PatchSides",
     "Resolution",
+    "WideDomain",
     "airfoil_mesh",
     "box_mesh",
     "cone_mesh",

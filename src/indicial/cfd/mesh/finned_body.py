@@ -1,33 +1,24 @@
-r"""A structured mesh wrapped round a finned body in a supersonic stream.
+r"""A structured mesh wrapped round a finned body.
 
-One block of planes along x, radial levels and azimuthal columns. It begins in the plane of the nose's tip: the stream
-ahead of an attached bow shock is undisturbed, and wedge-shaped cells round the axis would only be in the way (least
-squares gradients are unstable on them). A fin is a column of nodes split into two sheets, one for each of its faces.
-Above the tip the sheets close over a few levels, and the gap between them is one column of cells standing on the flat
-tip, the last of them prisms. So the flat faces, the tip and the thickness of the fins are exact.
+One block of planes along x, radial levels and azimuthal columns; `body_frame` says where they stand. A fin is a column
+of nodes split into two sheets, one for each of its faces. Above the tip the sheets close over a few levels, and the gap
+between them is one column of cells standing on the flat tip, the last of them prisms. So the flat faces, the tip and
+the thickness of the fins are exact. Behind a blunt trailing edge the gap goes on as the fin's wake, if there is one.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
-from indicial.cfd.mesh.bow_shock import influence_limit, outer_radius, shock_angle
+from indicial.cfd.mesh.body_frame import Frame, WideDomain, narrow_frame, wide_frame
 from indicial.cfd.mesh.geometry import Array, Index
 from indicial.cfd.mesh.hexahedra import I_MINUS, I_PLUS, J_MINUS, J_PLUS, K_MINUS, K_PLUS, PatchSides
 from indicial.cfd.mesh.mesh import Mesh
 from indicial.cfd.mesh.sectors import Extent, Sector, split_into_sectors
-from indicial.cfd.mesh.stations import (
-    Anchor,
-    axial_stations,
-    azimuthal_fractions,
-    plain_levels,
-    smooth_step,
-    tip_levels,
-)
+from indicial.cfd.mesh.stations import azimuthal_fractions
 from indicial.cfd.mesh.structured import block_hexahedra, block_nodes, positive
 from indicial.cfd.shapes.cone import Cone
 from indicial.cfd.shapes.finned_body import FinnedBody
@@ -38,44 +29,55 @@ Resolution = Literal["quick", "coarse", "medium", "fine"]
 RESOLUTIONS: dict[Resolution, float] = {"quick": 1.0, "coarse": 1.5, "medium": 2.25, "fine": 3.375}
 """Cells along each direction relative to the quick mesh: each preset has 1.5 times as many as the one before."""
 
-NOSE_STEP = 0.025
-"""First step behind the tip, and radius of the inflow disc there, over the nose's length, on the quick mesh."""
+Wake = Literal["none", "sting"]
 
-SPAN_CELLS, OUTER_CELLS, PLAIN_CELLS, QUADRANT_CELLS = 7, 8, 16, 8
-"""Quick mesh: cells along a fin's span, beyond its tip, from a finless body outwards, round 90 degrees."""
+WIDE_DOMAIN = WideDomain()
+
+QUADRANT_CELLS = 8
+"""Cells round 90 degrees, on the quick mesh."""
 
 
 def finned_body_mesh(
     body: FinnedBody,
     resolution: Resolution | float = "coarse",
     *,
-    mach: float,
+    mach: float | None = None,
     sector: Extent = "half",
     margin: float = 1.15,
+    wake: Wake = "none",
+    domain: WideDomain = WIDE_DOMAIN,
 ) -> Mesh:
-    """Mesh about a body with or without fins, from the plane of its tip to that of its base.
+    """Mesh about a body with or without fins.
+
+    Without a wake it goes from the plane of the tip to that of the base, which asks for a supersonic stream: what is
+    ahead of the attached bow shock is undisturbed, and what leaves beside the base says nothing any more. The outer
+    boundary lies outside the bow shock by `margin`, up to the radius beyond which waves can no longer return to the
+    body (`influence_limit`, times `margin`). With `wake` "sting" the body goes on as a cylinder of its own diameter
+    whose loads are left out, in a wide domain all round, for any Mach number. The flat base, and the fins' blunt
+    trailing edges, carry no load in either.
 
     Patches: "body", "fin1", "fin2", ... (walls; number n is the n-th of `FinSet.angles`, both faces and the tip),
-    "farfield" (inflow and outer boundary), "outflow" (the plane of the base), and, on a sector, "symmetry"
-    (plane y = 0) and "symmetry_z" (z = 0). The flat base is not part of the mesh. Cells are numbered plane by plane
-    along x, within a plane along the radius first.
-
-    The outer boundary lies outside the bow shock by `margin`, up to the radius beyond which waves can no longer
-    return to the body (`influence_limit`, times `margin`).
+    "farfield", "outflow" (the plane of the base, without a wake), "sting" (the sting, the fins' trailing edges and the
+    needle ahead of the nose, with one), and, on a sector, "symmetry" (plane y = 0) and "symmetry_z" (z = 0). Cells are
+    numbered plane by plane along x, within a plane along the radius first.
 
     Parameters
     ----------
     body : FinnedBody
-        Single-wedge fins must end at the base.
+        Without a wake single-wedge fins must end at the base.
     resolution : "quick", "coarse", "medium", "fine" or float
         About 9,100, 31,000, 104,000 and 353,000 cells for half a Basic Finner; a number is the ratio of cells along
-        every direction to those of "quick".
-    mach : float
-        Mach number [-], above 1 with an attached bow shock. The outflow plane asks for about 1.4 or more.
+        every direction to those of "quick". With a sting about 2.4 times as many.
+    mach : float, optional
+        Mach number [-], above 1 with an attached bow shock; only without a wake, where the outflow plane asks for
+        about 1.4 or more.
     sector : {"half", "full", "quarter"}
         "half" is y >= 0, "quarter" y, z >= 0 (an axisymmetric or doubly symmetric flow only).
     margin : float
         At least 1.
+    wake : {"none", "sting"}
+    domain : WideDomain
+        Size of the domain with a sting.
 
     Raises
     ------
@@ -85,8 +87,15 @@ def finned_body_mesh(
     factor = resolution_factor(resolution)
     if not margin >= 1.0:
         raise InputError(f"margin is {margin}, must be at least 1")
+    if wake not in get_args(Wake):
+        raise InputError(f"wake is {wake!r}, must be one of {', '.join(get_args(Wake))}")
     sectors = split_into_sectors(body.fins, sector)
-    frame = _frame(body, factor, mach, margin)
+    if wake == "sting":
+        frame = wide_frame(body, factor, domain)
+    elif mach is None:
+        raise InputError("mach is missing: a mesh without a wake follows the bow shock; give it or take wake='sting'")
+    else:
+        frame = narrow_frame(body, factor, mach, margin)
     columns = [_columns(s, factor) for s in sectors]
     blocks = [_sector_nodes(frame, s, f, body.fins) for s, f in zip(sectors, columns, strict=True)]
     points = np.concatenate(blocks, axis=2)
@@ -115,139 +124,13 @@ def resolution_factor(resolution: Resolution | float) -> float:
     return positive("resolution", resolution)
 
 
-@dataclass(frozen=True)
-class _Frame:
-    """Planes and levels of the block [calibres]: nodes away from the fins, and on their sheets.
-
-    x, s : (ni, nj) axial station and radius away from the fins; sheet_x, sheet_s, sheet_h : the same and the half
-    gap on the sheets, s and h measured along and normal to the fin. The fins take planes `lead` to `trail` and
-    levels 0 to `tip`; the gap is closed again at level `closed`.
-    """
-
-    x: Array
-    s: Array
-    sheet_x: Array
-    sheet_s: Array
-    sheet_h: Array
-    lead: int
-    trail: int
-    tip: int
-    closed: int
-
-
-def _frame(body: FinnedBody, factor: float, mach: float, margin: float) -> _Frame:
-    slope = margin * math.tan(shock_angle(mach, body.nose.tip_half_angle))
-    fins = body.fins
-    largest = 0.5 if fins is None else 0.5 + fins.span
-    planes, lead, trail = _planes(body, factor)
-    first = NOSE_STEP * body.nose.length
-    if fins is not None:
-        slope = max(slope, (1.3 * largest - first) / fins.root_leading_edge)
-    beta = shock_angle(mach, body.nose.tip_half_angle)
-    limit = max(1.5 * largest, margin * influence_limit(body.length, largest, beta))
-    outer = outer_radius(planes, first=first, slope=slope, limit=limit)
-    inner = body.radius(planes)
-    if fins is None:
-        s = plain_levels(inner, outer, max(2, round(PLAIN_CELLS * factor)))
-        x = np.broadcast_to(planes[:, None], s.shape)
-        return _Frame(x, s, x, s, np.zeros_like(s), 0, 0, 0, 0)
-    n_span, n_outer = max(2, round(SPAN_CELLS * factor)), max(2, round(OUTER_CELLS * factor))
-    s = _levels_with_tip(body, fins, planes, inner, outer, n_span, n_outer)
-    closed = n_span + max(1, round(factor)) if fins.thickness_ratio > 0.0 else n_span
-    return _with_sheets(fins, planes, s, lead, trail, n_span, closed)
-
-
-def _planes(body: FinnedBody, factor: float) -> tuple[Array, int, int]:
-    """Axial stations [calibres], and the indices of the fins' leading and trailing edges."""
-    nose, fins = body.nose, body.fins
-    tip_step, largest = NOSE_STEP * nose.length, 0.6
-    anchors = [Anchor(0.0, tip_step, min(largest, 0.1 * nose.length))]
-    if nose.length < body.length * (1.0 - 1e-9):
-        anchors.append(Anchor(nose.length, min(0.16, 0.1 * nose.length), largest))
-    edges = [0.0, 0.0]
-    if fins is not None:
-        chord, edges = fins.root_chord, [fins.root_leading_edge, fins.trailing_edge]
-        if edges[0] <= anchors[-1].x + 1e-9:
-            anchors.pop()
-        anchors.append(Anchor(edges[0], 0.08 * chord, 0.12 * chord))
-        if fins.section == "double_wedge":
-            anchors.append(Anchor(0.5 * (edges[0] + edges[1]), 0.09 * chord, 0.12 * chord))
-        anchors.append(Anchor(edges[1], 0.12 * chord, largest))
-    if anchors[-1].x < body.length - 1e-9:
-        anchors.append(Anchor(body.length, largest, largest))
-    stations, at = axial_stations(anchors, factor)
-    index = {anchor.x: i for anchor, i in zip(anchors, at, strict=True)}
-    return stations, index[edges[0]], index[edges[1]]
-
-
-def _levels_with_tip(
-    body: FinnedBody, fins: FinSet, planes: Array, inner: Array, outer: Array, n_span: int, n_outer: int
-) -> Array:
-    """Radial levels (ni, nj): plain near the nose, with a level exactly at the fins' tips along the fins."""
-    tip = np.minimum(0.5 + fins.span, inner + 0.6 * (outer - inner))
-    start = min(body.nose.length, fins.root_leading_edge - 1.0)
-    end = max(fins.root_leading_edge - 0.5, 0.5 * (start + fins.root_leading_edge))
-    weight = smooth_step(planes, start, end)[:, None]
-    plain = plain_levels(inner, outer, n_span + n_outer)
-    levels = (1.0 - weight) * plain + weight * tip_levels(inner, tip, outer, n_span, n_outer)
-    levels[:, 0] = inner
-    return levels
-
-
-def _with_sheets(fins: FinSet, planes: Array, s: Array, lead: int, trail: int, tip: int, closed: int) -> _Frame:
-    """Place the nodes of the fins' sheets, and shear the planes along swept edges."""
-    ends_at_base = trail == planes.size - 1
-    shift_lead = float(fins.leading_edge(1.0) - fins.leading_edge(0.0))
-    shift_trail = shift_lead + fins.tip_chord - fins.root_chord
-    if fins.section == "single_wedge" and not ends_at_base:
-        raise InputError("a mesh of single-wedge fins needs their trailing edge at the body's base")
-    if ends_at_base and abs(shift_trail) > 1e-9:
-        raise InputError("fins that end at the base must have an unswept trailing edge for this mesh")
-    if not ends_at_base and shift_trail > 0.8 * (planes[-1] - planes[trail]):
-        raise InputError("the fins' swept trailing edge reaches too near the base for this mesh")
-    chordwise = np.clip((planes - planes[lead]) / (planes[trail] - planes[lead]), 0.0, 1.0)
-    in_chord = (np.arange(planes.size) >= lead) & (np.arange(planes.size) <= trail)
-    blend = planes[lead] - max(1.0, 2.0 * shift_lead)
-    ahead = np.clip((planes - blend) / (planes[lead] - blend), 0.0, 1.0)
-    behind = np.ones(planes.size)
-    if not ends_at_base:
-        behind = np.clip((planes[-1] - planes) / (planes[-1] - planes[trail]), 0.0, 1.0)
-    shear = ((1.0 - chordwise) * shift_lead + chordwise * shift_trail) * ahead * behind
-
-    def half_gap(fraction: Array) -> Array:
-        section = np.where(in_chord, fins.half_thickness(chordwise), 0.0)
-        return section[:, None] * fins.chord(np.minimum(fraction, 1.0))
-
-    fraction = np.clip((s - s[:, :1]) / fins.span, 0.0, 1.0)
-    root = s[:, :1].copy()
-    for _ in range(30):  # the sheets' feet lie on the cylinder: a contraction by about (thickness)^2 a pass
-        root = np.sqrt(s[:, :1] ** 2 - half_gap((root - s[:, :1]) / fins.span) ** 2)
-    on_fin = np.arange(s.shape[1]) <= tip
-    sheet_s = np.where(on_fin, s - (s[:, :1] - root) * (1.0 - fraction), s)
-    sheet_fraction = np.where(on_fin, (sheet_s - s[:, :1]) / fins.span, 1.0)
-    closing = np.ones(s.shape[1])
-    if closed > tip:
-        closing = np.clip((closed - np.arange(s.shape[1])) / (closed - tip), 0.0, 1.0)
-    return _Frame(
-        x=planes[:, None] + shear[:, None] * fraction,
-        s=s,
-        sheet_x=planes[:, None] + shear[:, None] * sheet_fraction,
-        sheet_s=sheet_s,
-        sheet_h=half_gap(sheet_fraction) * closing,
-        lead=lead,
-        trail=trail,
-        tip=tip,
-        closed=closed,
-    )
-
-
 def _columns(sector: Sector, factor: float) -> Array:
     """Fractions of the sector at which its columns stand."""
     n = max(2, round(QUADRANT_CELLS * factor * (sector.end - sector.start) / (0.5 * np.pi)))
     return azimuthal_fractions(n, sector.start_fin is not None, sector.end_fin is not None)
 
 
-def _sector_nodes(frame: _Frame, sector: Sector, fractions: Array, fins: FinSet | None) -> Array:
+def _sector_nodes(frame: Frame, sector: Sector, fractions: Array, fins: FinSet | None) -> Array:
     """Nodes (ni, nj, nk, 3) of one sector, from sheet to sheet or plane of symmetry."""
     x_a, angle_a, r_a = _edge(frame, sector.start, sector.start_fin, 1.0)
     x_b, angle_b, r_b = _edge(frame, sector.end, sector.end_fin, -1.0)
@@ -264,7 +147,7 @@ def _sector_nodes(frame: _Frame, sector: Sector, fractions: Array, fins: FinSet 
     return points
 
 
-def _edge(frame: _Frame, azimuth: float, fin: int | None, side: float) -> tuple[Array, Array, Array]:
+def _edge(frame: Frame, azimuth: float, fin: int | None, side: float) -> tuple[Array, Array, Array]:
     """Axial station, azimuth and radius (ni, nj) of the nodes at one end of a sector."""
     if fin is None:
         return frame.x, np.full_like(frame.s, azimuth), frame.s
@@ -272,7 +155,7 @@ def _edge(frame: _Frame, azimuth: float, fin: int | None, side: float) -> tuple[
     return frame.sheet_x, azimuth + turn, np.hypot(frame.sheet_s, frame.sheet_h)
 
 
-def _place_sheet(points: Array, frame: _Frame, azimuth: float, side: float) -> None:
+def _place_sheet(points: Array, frame: Frame, azimuth: float, side: float) -> None:
     """Put nodes on one face of a fin, in the fin's own axes: both faces agree to the last bit where they meet."""
     cosine, sine = math.cos(azimuth), math.sin(azimuth)
     points[..., 0] = frame.sheet_x
@@ -290,8 +173,8 @@ def _close_planes(points: Array, body: FinnedBody, sector: Extent) -> None:
     points[:, :, 0, 1 if sector == "half" else 2] = 0.0
 
 
-def _assemble(frame: _Frame, points: Array, sectors: list[Sector], sizes: list[int], sector: Extent) -> Mesh:
-    """Number cells plane by plane, keep the gap columns only above the tips, and name the boundary."""
+def _assemble(frame: Frame, points: Array, sectors: list[Sector], sizes: list[int], sector: Extent) -> Mesh:
+    """Number cells plane by plane, keep the gap columns only above the tips and in wakes, and name the boundary."""
     nodes = block_nodes(*points.shape[:3])
     gaps = np.cumsum(sizes) - 1
     if sector == "full" and sectors[0].start_fin is not None:
@@ -302,15 +185,18 @@ def _assemble(frame: _Frame, points: Array, sectors: list[Sector], sizes: list[i
     keep = np.ones(cells.shape[:3], dtype=bool)
     keep[:, :, gaps] = False
     keep[frame.lead : frame.trail, frame.tip : frame.closed, gaps] = True
+    if frame.open_wake:
+        keep[frame.trail :, : frame.closed, gaps] = True
     number = np.full(keep.shape, -1, dtype=np.int64)
     in_order = number.transpose(0, 2, 1)
     in_order[keep.transpose(0, 2, 1)] = np.arange(int(keep.sum()))
-    patches = [PatchSides.of("body", "wall", _kept(number[:, 0], J_MINUS))]
+    patches = [PatchSides.of("body", "wall", _kept(number[frame.nose : frame.base, 0], J_MINUS))]
     patches += _fin_patches(frame, number, gaps, sectors)
-    patches += [
-        PatchSides.of("farfield", "farfield", _kept(number[0], I_MINUS), _kept(number[:, -1], J_PLUS)),
-        PatchSides.of("outflow", "outflow", _kept(number[-1], I_PLUS)),
-    ]
+    far, end = [_kept(number[0], I_MINUS), _kept(number[:, -1], J_PLUS)], _kept(number[-1], I_PLUS)
+    if frame.is_wide:
+        patches += [PatchSides.of("farfield", "farfield", *far, end), _sting_patch(frame, number, gaps)]
+    else:
+        patches += [PatchSides.of("farfield", "farfield", *far), PatchSides.of("outflow", "outflow", end)]
     if sector == "half":
         patches.append(PatchSides.of("symmetry", "symmetry", (number[:, :, 0], K_MINUS), (number[:, :, -1], K_PLUS)))
     elif sector == "quarter":
@@ -323,7 +209,15 @@ def _kept(cells: Index, side: int) -> tuple[Index, int]:
     return cells[cells >= 0], side
 
 
-def _fin_patches(frame: _Frame, number: Index, gaps: Index, sectors: list[Sector]) -> list[PatchSides]:
+def _sting_patch(frame: Frame, number: Index, gaps: Index) -> PatchSides:
+    """Needle, sting and the fins' blunt trailing edges."""
+    sides = [_kept(number[: frame.nose, 0], J_MINUS), _kept(number[frame.base :, 0], J_MINUS)]
+    if frame.open_wake:
+        sides.append((number[frame.trail, : frame.tip, gaps], I_MINUS))
+    return PatchSides.of("sting", "sting", *sides)
+
+
+def _fin_patches(frame: Frame, number: Index, gaps: Index, sectors: list[Sector]) -> list[PatchSides]:
     """One patch for each fin: its two faces, and its tip if it has thickness."""
     chord, span = slice(frame.lead, frame.trail), slice(0, frame.tip)
     patches: dict[int, PatchSides] = {}

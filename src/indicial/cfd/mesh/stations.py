@@ -64,6 +64,11 @@ def tip_levels(inner: Array, tip: Array, outer: Array, n_span: int, n_outer: int
     return levels
 
 
+def wide_levels(inner: Array, outer: Array, first: float, n: int) -> Array:
+    """Radii (ni, n + 1) from `inner` to `outer`, steps growing by a constant ratio from `first`."""
+    return np.stack([a + geometric(min(first, (b - a) / n), b - a, n) for a, b in zip(inner, outer, strict=True)])
+
+
 def smooth_step(x: Array, start: float, end: float) -> Array:
     """0 up to `start`, 1 from `end`, a smooth cubic between."""
     u = np.clip((x - start) / (end - start), 0.0, 1.0)
