@@ -2,7 +2,8 @@
 
 from indicial.cfd.march.ilu import BlockILU, Pattern
 from indicial.cfd.march.krylov import KrylovResult, gmres
+from indicial.cfd.march.preconditioner import TwoLevel
 from indicial.cfd.march.steady import SteadyState, converge
 from indicial.cfd.march.unsteady import March, march
 
-__all__ = ["BlockILU", "KrylovResult", "March", "Pattern", "SteadyState", "converge", "gmres", "march"]
+__all__ = ["BlockILU", "KrylovResult", "March", "Pattern", "SteadyState", "TwoLevel", "converge", "gmres", "march"]

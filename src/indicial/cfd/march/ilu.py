@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sparse
 from numba import njit
 
 from indicial.cfd.flow.grid import Grid
@@ -52,6 +53,22 @@ class Pattern:
         slots[inside] = place[n:]
         indptr = np.concatenate([[0], np.cumsum(np.bincount(i, minlength=n))]).astype(np.int32)
         return cls(indptr, j[order].astype(np.int32), place[:n], slots)
+
+    @classmethod
+    def wide(cls, grid: Grid) -> Pattern:
+        """The pattern of nearest neighbours and theirs: all that the second-order Jacobian couples."""
+        compact, n = cls.of(grid), grid.n_cells
+        ones = np.ones(len(compact.indices), dtype=np.int32)
+        adjacent = sparse.csr_matrix((ones, compact.indices, compact.indptr), shape=(n, n))
+        square = (adjacent @ adjacent).tocsr()
+        square.sort_indices()
+        indptr, indices = square.indptr.astype(np.int32), square.indices.astype(np.int32)
+        # rows follow one another and are sorted, so that row and column together are one sorted key
+        key = np.repeat(np.arange(n), np.diff(indptr)) * n + indices
+        rows = np.repeat(np.arange(n), np.diff(grid.offsets))
+        slots = np.where(grid.cells >= 0, np.searchsorted(key, rows * n + grid.cells), -1)
+        diagonal = np.searchsorted(key, np.arange(n) * (n + 1))
+        return cls(indptr, indices, diagonal.astype(np.int32), slots.astype(np.int32))
 
 
 @njit(cache=True, error_model="numpy")
