@@ -4,6 +4,7 @@ from indicial.rom.check import CheckedCoefficient, PredictionCheck, check_predic
 from indicial.rom.convolution import ConvolutionModel
 from indicial.rom.deficiency import DeficiencyIntegral, deficiency, deficiency_integral
 from indicial.rom.model import ReducedModel
+from indicial.rom.projection import HeldOut, OrderTrial, Projection, project
 from indicial.rom.quasi_steady import QuasiSteadyError, QuasiSteadyModel, quasi_steady_error
 from indicial.rom.realisation import realise
 from indicial.rom.response import StepResponse, StepResponses
@@ -15,7 +16,10 @@ __all__ = [
     "CheckedCoefficient",
     "ConvolutionModel",
     "DeficiencyIntegral",
+    "HeldOut",
+    "OrderTrial",
     "PredictionCheck",
+    "Projection",
     "QuasiSteadyError",
     "QuasiSteadyModel",
     "ReducedModel",
@@ -25,6 +29,7 @@ __all__ = [
     "check_prediction",
     "deficiency",
     "deficiency_integral",
+    "project",
     "quasi_steady_error",
     "realise",
 ]
