@@ -19,7 +19,7 @@ from indicial.solver import LinearisedFlow
 
 _SMALL_CHANNEL = 1e-3  # channels smaller than this part of the largest are measured by that part of it
 _GRID = 200
-_NEAR = 0.02  # of the band: new solutions keep this distance, or this part of k, from the old
+_NEAR = 0.02  # of k: new solutions keep this distance from the old
 _FAR = 10.0  # real shift, in k_max
 _SLOWEST = 1e-4  # of the band: lowest reduced frequency of the grid
 
@@ -35,14 +35,11 @@ class Unseen:
         Forward solutions, shape (n, n_inputs).
     transfer : ndarray
         H(ik), shape (n_outputs, n_inputs).
-    error : float
-        Of the projection then, largest over the channels, relative to their peaks.
     """
 
     k: float
     solutions: ComplexArray
     transfer: ComplexArray
-    error: float
 
 
 class Interpolation:
@@ -100,7 +97,7 @@ class Interpolation:
         error = np.abs(transfer - self.full.transfer(grid)[0])
         ratio = error / np.maximum(self._residuals(grid)[0], 1e-300)
         self._gamma = ratio if self._gamma is None else np.maximum(self._gamma, ratio)
-        return Unseen(k, solutions, transfer, float(np.max(error / self.scale)))
+        return Unseen(k, solutions, transfer)
 
     def take(self, unseen: Unseen) -> None:
         """Take solutions in, with the adjoint ones at the same frequency."""
@@ -117,20 +114,15 @@ class Interpolation:
 
     def worst(self) -> float:
         """Reduced frequency of the grid, away from those taken, where the estimated error is largest."""
-        return float(self.k[np.argmax(np.where(self._away(self.points), self._largest(), -1.0))])
+        largest = np.max(self.error() / self.scale, axis=(1, 2))
+        distance = np.min(np.abs(self.k[:, None] - self.points), axis=1)
+        return float(self.k[np.argmax(np.where(distance > _NEAR * self.k, largest, -1.0))])
 
     def widest(self, others: Array) -> float:
         """Reduced frequency of the grid furthest from those taken and from `others`."""
         known = np.concatenate([self.points, others])
         distance = np.min(np.abs(self.k[:, None] - known), axis=1)
         return float(self.k[np.argmax(distance)])
-
-    def _largest(self) -> Array:
-        return np.asarray(np.max(self.error() / self.scale, axis=(1, 2)))
-
-    def _away(self, known: Array) -> Array:
-        distance = np.abs(self.k[:, None] - known)
-        return np.asarray(np.all(distance > _NEAR * np.minimum(self.k[:, None], self.k[-1]), axis=1) & (self.k > 0.0))
 
     def _start(self, k_max: float) -> None:
         for shift in (0j, 1j * k_max, complex(_FAR * k_max)):

@@ -193,13 +193,15 @@ def project(
         Most states to choose from.
     max_points : int
         Most frequencies solved at for the projection, at least 3. Each costs as many forward solutions as there are
-        inputs and as many adjoint ones as there are outputs.
+        inputs and as many adjoint ones as there are outputs; so does a real shift, and each of two frequencies held
+        out costs the forward ones.
 
     Returns
     -------
     Projection
-        Where the tolerance cannot be met within `order`, `max_order` or `max_points`, the stable model of least error:
-        then `Projection.met` is false and a warning is logged.
+        The `errors` of its model are those estimated over the band. Where the tolerance cannot be met within `order`,
+        `max_order` or `max_points`, it is the stable model of least error: then `Projection.met` is false and a
+        warning is logged.
 
     Raises
     ------
