@@ -135,6 +135,15 @@ def velocity_from_angles(speed: float, alpha: float, beta: float = 0.0) -> Array
     return speed * np.array([math.cos(alpha) * math.cos(beta), math.sin(beta), math.sin(alpha) * math.cos(beta)])
 
 
+def turning(angle: str, alpha: float, beta: float) -> Array:
+    """Derivative of the direction of V_b, body axes, with respect to alpha or beta, shape (3,)."""
+    ca, sa, cb, sb = math.cos(alpha), math.sin(alpha), math.cos(beta), math.sin(beta)
+    directions = {"alpha": np.array([-sa * cb, 0.0, ca * cb]), "beta": np.array([-ca * sb, cb, -sa * sb])}
+    if angle not in directions:
+        raise InputError(f"no angle {angle!r}; there are {', '.join(directions)}")
+    return directions[angle]
+
+
 def flow_angles(velocity: ArrayLike) -> tuple[Array, Array, Array]:
     """Speed [m/s], alpha and beta [rad] of body velocities ``(..., 3)``; alpha and beta are 0 at rest."""
     v = np.asarray(velocity, dtype=float)

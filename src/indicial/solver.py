@@ -8,8 +8,10 @@ from typing import Any, Protocol, runtime_checkable
 from numpy.typing import ArrayLike, NDArray
 
 from indicial.conventions import COEFFICIENTS, Array, ReferenceQuantities
+from indicial.frequency import FrequencyResponse
 from indicial.history import History
 from indicial.motion import FlightCondition, Motion, Rates
+from indicial.sensitivity import Sensitivities
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,7 @@ class LinearisedFlow(Protocol):
     baseline : ndarray
         (CA, CY, CN, Cl, Cm, Cn) of the steady state, shape (6,).
     inputs : tuple of str
-        Of alpha, beta [rad] and p, q, r (dimensionless by `reference`).
+        Of alpha, beta [rad] and ``q c/2V, p b/2V, r b/2V``.
     outputs : tuple of str
         Of the six coefficients.
     b, c, d : ndarray
@@ -129,4 +131,29 @@ class LinearisedFlow(Protocol):
         DivergenceError
             If the tolerance is not reached.
         """
+        ...
+
+
+@runtime_checkable
+class FrequencySolver(Protocol):
+    """A solver that linearises itself and answers in the frequency domain."""
+
+    @property
+    def reference(self) -> ReferenceQuantities:
+        """What the loads are made dimensionless with."""
+        ...
+
+    def frequency_response(
+        self, condition: FlightCondition, k: ArrayLike = ..., inputs: tuple[str, ...] | None = ...
+    ) -> FrequencyResponse:
+        """H(ik) from motion to loads at reduced frequencies `k`, with H(0) and H'(0)."""
+        ...
+
+
+@runtime_checkable
+class AdjointSolver(Protocol):
+    """A solver that gives what its steady loads change with."""
+
+    def sensitivities(self, condition: FlightCondition, rates: Rates = ...) -> Sensitivities:
+        """Derivatives of all six coefficients with respect to every input."""
         ...

@@ -11,24 +11,32 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from indicial import __version__
+from indicial.cfd.adjoint import sensitivities
 from indicial.cfd.field import FlowField
 from indicial.cfd.flow.gas import GAMMA, P
 from indicial.cfd.flow.grid import OUTFLOW, SYMMETRY, Grid
 from indicial.cfd.flow.residual import MeshMotion, Residual
+from indicial.cfd.frequency_sweep import frequency_response
 from indicial.cfd.march.checkpoint import Checkpoint
 from indicial.cfd.march.ilu import Pattern
 from indicial.cfd.march.steady import Progress, SteadyState, converge
 from indicial.cfd.march.unsteady import march
 from indicial.cfd.mesh import Mesh
+from indicial.cfd.operator import ANTISYMMETRIC, SYMMETRIC, FlowOperator
 from indicial.conventions import Array, ReferenceQuantities, mesh_from_body
 from indicial.errors import DivergenceError, InputError
+from indicial.frequency import INPUTS, FrequencyResponse, reduced_frequencies
 from indicial.history import History
 from indicial.motion import FlightCondition, Motion, Rates, SteadyMotion
+from indicial.sensitivity import Sensitivities
 from indicial.solver import SteadyLoads
 
 log = logging.getLogger(__name__)
 
 AMBIENT_PRESSURE = 1.0 / GAMMA
+
+LINEARISED_FROM = 1e-6
+"""Largest residual, relative to that of still air, of a steady state about which the flow is linearised."""
 
 
 @dataclass(frozen=True)
@@ -186,6 +194,73 @@ class FiniteVolumeSolver:
                 "worst_step_residual": result.worst_residual,
             },
         )
+
+    def linearise(
+        self, condition: FlightCondition, rates: Rates = Rates(), *, tolerance: float = 1e-8
+    ) -> tuple[FlowOperator, ...]:
+        """The flow linearised about a steady state: one operator, or a symmetric and an antisymmetric one on half a body.
+
+        Raises
+        ------
+        InputError
+            If the steady state is not converged well enough, or memory would not suffice.
+        """
+        motion = SteadyMotion(condition, rates)
+        state = self._state(condition, motion.velocity(0.0), motion.rate(0.0))
+        if not state.residuals[-1] <= LINEARISED_FROM:
+            raise InputError(
+                f"the steady state has a residual of {state.residuals[-1]:.1e}: to be linearised about it must be "
+                f"below {LINEARISED_FROM:.0e}; set a smaller steady_tolerance"
+            )
+        self._residual(state.q, state.motion)
+        baseline = self._coefficients(*self._residual.forces(AMBIENT_PRESSURE), condition)
+        symmetries: tuple[float | None, ...] = (SYMMETRIC, ANTISYMMETRIC) if self._mirrored else (None,)
+        return tuple(
+            FlowOperator(
+                self._residual,
+                self._pattern,
+                state,
+                baseline,
+                condition,
+                self._reference,
+                symmetry=symmetry,
+                planar=not self._mirrored and bool(np.any(self.grid.kind == SYMMETRY)),
+                tolerance=tolerance,
+            )
+            for symmetry in symmetries
+        )
+
+    def frequency_response(
+        self,
+        condition: FlightCondition,
+        k: ArrayLike = (),
+        inputs: tuple[str, ...] | None = None,
+        rates: Rates = Rates(),
+    ) -> FrequencyResponse:
+        """H(ik) from motion to the six loads at reduced frequencies `k`, with H(0) and H'(0).
+
+        Parameters
+        ----------
+        inputs : tuple of str, optional
+            Of `indicial.frequency.INPUTS`; all that the mesh allows if not given (a plane flow has no beta, p and r).
+
+        Raises
+        ------
+        InputError
+            If a frequency is negative or not finite, an input is unknown, or the steady state is not converged.
+        DivergenceError
+            If a linear system cannot be solved.
+        """
+        ks = reduced_frequencies(k)
+        operators = self.linearise(condition, rates)
+        known = {name for operator in operators for name in operator.inputs} | {"alphadot"}
+        wanted = tuple(name for name in INPUTS if name in known) if inputs is None else inputs
+        needed = [op for op in operators if any(name.removesuffix("dot") in op.inputs for name in wanted)]
+        return frequency_response(needed or operators, wanted, ks, self._progress)
+
+    def sensitivities(self, condition: FlightCondition, rates: Rates = Rates()) -> Sensitivities:
+        """Derivatives of all six coefficients with respect to every input, by the adjoint."""
+        return sensitivities(self.linearise(condition, rates))
 
     def field(self, condition: FlightCondition, rates: Rates = Rates()) -> FlowField:
         """The steady flow itself, for pictures and checks."""

@@ -2,11 +2,13 @@
 
 - `moving_frame` (MRF): steady solutions at constant rate;
 - `forced_oscillation` (FOM): harmonic motion and its three reductions;
+- `operator`: the linearised flow, all derivatives from a few linear solves, at k = 0 and at any k;
+- `adjoint`: the same by transposed solves, one for each load;
 - `indicial_response` (IRM): steps, and the area under their deficiency.
 
 Each keeps its experiments apart from their reading, and its `run` takes any `indicial.solver.Solver`.
 """
 
-from indicial.methods import forced_oscillation, indicial_response, moving_frame
+from indicial.methods import adjoint, forced_oscillation, indicial_response, moving_frame, operator
 
-__all__ = ["forced_oscillation", "indicial_response", "moving_frame"]
+__all__ = ["adjoint", "forced_oscillation", "indicial_response", "moving_frame", "operator"]

@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 from numba import njit, prange
+from numpy.typing import NDArray
 
 from indicial.cfd.flow.flux import hllc
 from indicial.cfd.flow.grid import MIRROR, SYMMETRY
@@ -451,7 +452,9 @@ class Jacobian:
         omega[:, 1:4] += np.cross(np.eye(3)[None], self._momentum[:, None, :]).transpose(0, 2, 1)
         return velocity, omega
 
-    def compact_blocks(self, extra: Array, slots: Index, diagonal: Index, count: int, parity: float = 1.0) -> Array:
+    def compact_blocks(
+        self, extra: NDArray[Any], slots: Index, diagonal: Index, count: int, parity: float = 1.0
+    ) -> NDArray[Any]:
         """First-order blocks in the sparse pattern given by `slots` and `diagonal`, shape (count, 5, 5)."""
         g = self.grid
         added = extra if self.source is None else extra + self.source

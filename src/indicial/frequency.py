@@ -1,0 +1,197 @@
+r"""Labelled frequency responses of loads to motion, and their netCDF files."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from indicial.conventions import COEFFICIENTS, Array, ReferenceQuantities
+from indicial.errors import InputError
+from indicial.files import read_netcdf, write_netcdf
+from indicial.motion import FlightCondition
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
+
+SCHEMA_VERSION = 1
+FORMAT = "indicial frequency response"
+
+INPUTS = ("alpha", "alphadot", "q", "beta", "p", "r")
+"""Motions from which loads respond: alpha and beta by translation [rad]; ``alphadot c/2V, q c/2V, p b/2V, r b/2V``."""
+
+
+def reduced_frequencies(k: ArrayLike) -> Array:
+    """`k` as an array of reduced frequencies, shape (n,).
+
+    Raises
+    ------
+    InputError
+        If one is negative or not finite.
+    """
+    values = np.atleast_1d(np.asarray(k, dtype=float))
+    if values.ndim != 1:
+        raise InputError(f"reduced frequencies must be a list, not an array of shape {values.shape}")
+    for value in values:
+        if not (np.isfinite(value) and value >= 0.0):
+            raise InputError(f"reduced frequency is {value}, must be finite and at least 0")
+    return values
+
+
+@dataclass(frozen=True)
+class FrequencyResponse:
+    r"""``H(ik)`` from motion to loads, ``k = omega c/2V``: what a small oscillation ``exp(iks)`` of an input makes.
+
+    Parameters
+    ----------
+    k : ndarray
+        Reduced frequencies, at least 0, shape (n,).
+    inputs : tuple of str
+        Of `INPUTS`; rates are per ``c/2V`` (``b/2V`` in roll and yaw) whatever `reference` says.
+    values : ndarray
+        Complex, of (CA, CY, CN, Cl, Cm, Cn), shape (n, 6, n_inputs).
+    static, slope : ndarray
+        ``H(0)`` and ``H'(0)``, the derivative with respect to ik, each of shape (6, n_inputs). For alphadot `static`
+        is the derivative C_alphadot and `slope` is not known (NaN).
+    direct : ndarray
+        ``H(i inf)``: the jump at the first instant of a step (piston), shape (6, n_inputs).
+    baseline : ndarray
+        The six coefficients of the steady state, shape (6,).
+    condition : FlightCondition
+    reference : ReferenceQuantities
+    provenance : dict
+        How it was made (plain values).
+    """
+
+    k: Array
+    inputs: tuple[str, ...]
+    values: NDArray[np.complex128]
+    static: Array
+    slope: Array
+    direct: Array
+    baseline: Array
+    condition: FlightCondition
+    reference: ReferenceQuantities
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "k", reduced_frequencies(self.k))
+        check_inputs(self.inputs)
+        n, m = len(self.k), len(self.inputs)
+        shapes = {"values": (n, 6, m), "static": (6, m), "slope": (6, m), "direct": (6, m), "baseline": (6,)}
+        for name, shape in shapes.items():
+            values = np.asarray(getattr(self, name))
+            if values.shape != shape:
+                raise InputError(f"frequency response {name} has shape {values.shape}, must be {shape}")
+            object.__setattr__(self, name, values)
+
+    def channel(self, output: str, input: str) -> NDArray[np.complex128]:
+        """H(ik) from one input to one load, shape (n,)."""
+        values: NDArray[np.complex128] = self.values[:, *self._place(output, input)]
+        return values
+
+    def at_zero(self, output: str, input: str) -> tuple[float, float]:
+        """``H(0)`` and ``H'(0)`` of one channel."""
+        place = self._place(output, input)
+        return float(self.static[place]), float(self.slope[place])
+
+    def _place(self, output: str, input: str) -> tuple[int, int]:
+        if output not in COEFFICIENTS:
+            raise InputError(f"no coefficient {output!r}; there are {', '.join(COEFFICIENTS)}")
+        if input not in self.inputs:
+            raise InputError(f"no input {input!r} in the frequency response; it has {', '.join(self.inputs)}")
+        return COEFFICIENTS.index(output), self.inputs.index(input)
+
+    def to_dataset(self) -> xarray.Dataset:
+        """The response as an `xarray.Dataset`, real and imaginary parts apart."""
+        import xarray as xr
+
+        data: dict[str, Any] = {
+            "real": (("k", "output", "input"), self.values.real),
+            "imag": (("k", "output", "input"), self.values.imag),
+            "baseline": ("output", self.baseline),
+        }
+        data |= {name: (("output", "input"), getattr(self, name)) for name in ("static", "slope", "direct")}
+        coords = {"k": ("k", self.k, {"units": "1"}), "output": list(COEFFICIENTS), "input": list(self.inputs)}
+        attrs = {
+            "format": FORMAT,
+            "schema_version": SCHEMA_VERSION,
+            "condition": json.dumps(asdict(self.condition)),
+            "reference": json.dumps(self.reference.to_dict()),
+            "provenance": json.dumps(self.provenance),
+        }
+        return xr.Dataset(data, coords, attrs)
+
+    def to_netcdf(self, path: str | Path) -> None:
+        """Write a netCDF-4 file in one step."""
+        write_netcdf(path, self.to_dataset())
+
+    @classmethod
+    def from_netcdf(cls, path: str | Path) -> Self:
+        """Read a file of `to_netcdf`.
+
+        Raises
+        ------
+        InputError
+            If the file is missing or holds something else.
+        """
+        data = read_netcdf(path, "frequency response file")
+        if data.attrs.get("format") != FORMAT or int(data.attrs["schema_version"]) != SCHEMA_VERSION:
+            raise InputError(f"{path}: not an {FORMAT} of schema version {SCHEMA_VERSION}")
+        return cls(
+            k=data["k"].values,
+            inputs=tuple(str(name) for name in data["input"].values),
+            values=data["real"].values + 1j * data["imag"].values,
+            **{name: data[name].values for name in ("static", "slope", "direct", "baseline")},
+            condition=FlightCondition(**json.loads(data.attrs["condition"])),
+            reference=ReferenceQuantities.from_dict(json.loads(data.attrs["reference"])),
+            provenance=json.loads(data.attrs["provenance"]),
+        )
+
+    def summary(self) -> str:
+        """Static values and slopes at k = 0 of the loads that respond."""
+        lines = [
+            f"frequency response at M {self.condition.mach:g} from {', '.join(self.inputs)}, "
+            f"{len(self.k)} reduced frequencies" + (f" {self.k[0]:g} to {self.k[-1]:g}" if len(self.k) else "")
+        ]
+        floor = 1e-6 * np.max(np.abs(self.static), initial=1e-300)
+        for j, source in enumerate(self.inputs):
+            for i, output in enumerate(COEFFICIENTS):
+                if abs(self.static[i, j]) > floor:
+                    slope = "" if np.isnan(self.slope[i, j]) else f", H'(0) = {self.slope[i, j]:.6g}"
+                    lines.append(f"  {output} to {source}: H(0) = {self.static[i, j]:.6g}{slope}")
+        return "\n".join(lines)
+
+    def plot(self, outputs: tuple[str, ...] = ("CN", "Cm")) -> Figure:
+        """Part in phase, and part out of phase over k, of each channel against reduced frequency."""
+        import matplotlib.pyplot as plt
+
+        figure, axes = plt.subplots(
+            len(outputs), len(self.inputs), squeeze=False, figsize=(4.2 * len(self.inputs), 2.8 * len(outputs))
+        )
+        moving = self.k > 0.0
+        k = self.k[moving]
+        for i, output in enumerate(outputs):
+            for j, source in enumerate(self.inputs):
+                values = self.channel(output, source)[moving]
+                axes[i, j].semilogx(k, values.real, ".-", label="in phase")
+                axes[i, j].semilogx(k, values.imag / k, ".--", label="out of phase / k")
+                axes[i, j].set_ylabel(f"{output} to {source}")
+                axes[-1, j].set_xlabel("reduced frequency k")
+        axes[0, 0].legend()
+        figure.tight_layout()
+        return figure
+
+
+def check_inputs(inputs: tuple[str, ...]) -> None:
+    """Raise InputError unless all are of `INPUTS` and none comes twice."""
+    for name in inputs:
+        if name not in INPUTS:
+            raise InputError(f"no input {name!r}; there are {', '.join(INPUTS)}")
+    if len(set(inputs)) != len(inputs):
+        raise InputError(f"an input comes twice: {', '.join(inputs)}")
