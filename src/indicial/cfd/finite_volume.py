@@ -198,7 +198,7 @@ class FiniteVolumeSolver:
     def linearise(
         self, condition: FlightCondition, rates: Rates = Rates(), *, tolerance: float = 1e-8
     ) -> tuple[FlowOperator, ...]:
-        """The flow linearised about a steady state: one operator, or a symmetric and an antisymmetric one on half a body.
+        """The flow linearised about a steady state: one operator, or symmetric and antisymmetric ones on half a body.
 
         Raises
         ------

@@ -92,9 +92,9 @@ def value(response: FrequencyResponse, name: str) -> float:
 def refusals(response: FrequencyResponse) -> dict[str, str]:
     """Derivatives that have no limit as k goes to 0, with the reason.
 
-    The out-of-phase part ``g(k) = Im H(ik)/k`` of a flow that forgets fast enough is even and smooth in k, so it changes
-    by four times less with each halving of k. One that changes by as much between 0 and k as between k and 2k has not
-    settled: the number at k = 0 then shows how far the mesh reaches.
+    The out-of-phase part ``g(k) = Im H(ik)/k`` of a flow that forgets fast enough is even and smooth in k, so it
+    changes by four times less with each halving of k. One that changes by as much between 0 and k as between k and 2k
+    has not settled: the number at k = 0 then shows how far the mesh reaches.
     """
     at = [np.flatnonzero(np.isclose(response.k, probe)) for probe in PROBES]
     if response.condition.mach >= 1.0 or any(found.size == 0 for found in at):
