@@ -89,9 +89,7 @@ def test_a_small_marched_oscillation_is_the_frequency_response(k: float) -> None
 
 def test_at_k_zero_the_operator_gives_the_derivatives_of_moving_frame_and_indicial_response() -> None:
     table = operator.derivatives(plate_response()).select(k=None)
-    steady = moving_frame.run(
-        plate(), CONDITION, ("alpha", "q"), amplitudes={"alpha": 1e-3, "q": 1e-3}, second=None
-    )
+    steady = moving_frame.run(plate(), CONDITION, ("alpha", "q"), amplitudes={"alpha": 1e-3, "q": 1e-3}, second=None)
     for name in ("CN_alpha", "Cm_alpha", "CN_q", "Cm_q"):
         assert steady[name] == pytest.approx(table.value(name), rel=1e-4)
     steps = marched_steps()

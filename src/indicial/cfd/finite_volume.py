@@ -214,11 +214,12 @@ class FiniteVolumeSolver:
             )
         self._residual(state.q, state.motion)
         baseline = self._coefficients(*self._residual.forces(AMBIENT_PRESSURE), condition)
+        pattern = Pattern.wide(self.grid)
         symmetries: tuple[float | None, ...] = (SYMMETRIC, ANTISYMMETRIC) if self._mirrored else (None,)
         return tuple(
             FlowOperator(
                 self._residual,
-                self._pattern,
+                pattern,
                 state,
                 baseline,
                 condition,

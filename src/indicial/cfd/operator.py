@@ -27,8 +27,9 @@ from numpy.typing import NDArray
 from indicial.cfd.flow.gas import conservative_jacobian
 from indicial.cfd.flow.jacobian import Jacobian
 from indicial.cfd.flow.residual import Residual
-from indicial.cfd.march.ilu import BlockILU, Pattern
+from indicial.cfd.march.ilu import Pattern
 from indicial.cfd.march.krylov import gmres
+from indicial.cfd.march.preconditioner import TwoLevel
 from indicial.cfd.march.steady import SteadyState, local_time_step
 from indicial.conventions import COEFFICIENTS, Array, ReferenceQuantities, mesh_from_body, turning
 from indicial.errors import DivergenceError, InputError
@@ -38,7 +39,7 @@ log = logging.getLogger(__name__)
 
 SYMMETRIC, ANTISYMMETRIC = 1.0, -1.0
 
-SHARED = 0.1
+SHARED = 0.03
 """Difference of two shifts, over the rate at which waves cross a typical cell, for which one factorisation will do."""
 
 _INPUTS = {SYMMETRIC: ("alpha", "q"), ANTISYMMETRIC: ("beta", "p", "r")}
@@ -76,6 +77,7 @@ class FlowOperator:
     ----------
     residual : Residual
     pattern : Pattern
+        `Pattern.wide` of the grid.
     state : SteadyState
         Converged: the operator inherits its error.
     baseline : ndarray
@@ -119,7 +121,7 @@ class FlowOperator:
         self._grid = residual.grid
         self.jacobian = Jacobian(residual, state.q, state.motion)
         self._mass = (2.0 * condition.mach * self._grid.volume)[:, None, None] * conservative_jacobian(state.q)
-        self._preconditioners: dict[complex, BlockILU] = {}
+        self._preconditioners: dict[complex, TwoLevel] = {}
         step = 2.0 * condition.mach * local_time_step(self._grid, state.q, state.motion)
         self._cell_rate = 1.0 / float(np.median(step))
         if symmetry is None:
@@ -239,7 +241,7 @@ class FlowOperator:
         DivergenceError
             If the tolerance is not reached: the steady state is not one, or the flow is close to unstable.
         """
-        ilu = self._preconditioner(shift)
+        preconditioner = self._preconditioner(shift)
         mass = shift * self._mass
         letters = "nji,nj->ni" if transposed else "nij,nj->ni"
         product = self.jacobian.apply_transposed if transposed else self.jacobian.apply
@@ -252,7 +254,7 @@ class FlowOperator:
 
         solution = gmres(
             apply,
-            ilu.solve_transposed if transposed else ilu.solve,
+            preconditioner.solve_transposed if transposed else preconditioner.solve,
             (rhs if shift == complex(shift).real else rhs.astype(complex)).reshape(-1, 5),
             self.tolerance,
             restart=80,
@@ -268,17 +270,16 @@ class FlowOperator:
             )
         return solution.x.ravel()
 
-    def _preconditioner(self, shift: complex) -> BlockILU:
+    def _preconditioner(self, shift: complex) -> TwoLevel:
         """The factorisation for a shift, or one for a shift that differs by little beside the cells' own rates."""
-        for made, ilu in self._preconditioners.items():
-            if abs(shift - made) <= SHARED * self._cell_rate:
-                return ilu
+        for other, made in self._preconditioners.items():
+            if abs(shift - other) <= SHARED * self._cell_rate:
+                return made
         # beside that of k = 0, which serves all low frequencies, keep the last one only
-        for made in [other for other in self._preconditioners if other != 0.0]:
-            del self._preconditioners[made]
-        p = self._pattern
-        extra = shift * self._mass
-        blocks = self.jacobian.compact_blocks(extra, p.slots, p.diagonal, len(p.indices), parity=self._parity)
-        self._preconditioners[shift] = BlockILU(p, blocks)
+        for other in [other for other in self._preconditioners if other != 0.0]:
+            del self._preconditioners[other]
+        extra = shift * self._mass if shift else None
+        made = TwoLevel(self.jacobian, self._pattern, extra, parity=self._parity)
+        self._preconditioners[shift] = made
         self.spent += SolveCount(factorisations=1)
-        return self._preconditioners[shift]
+        return made

@@ -78,7 +78,8 @@ def _fine_grid(k: Array) -> Array:
     """Logarithmic between the given frequencies, from a decade below the lowest."""
     edges = np.log(np.concatenate([[k[0] / 10.0], k]))
     inner = edges[:-1, None] + np.diff(edges)[:, None] * np.arange(_FINE) / _FINE
-    return np.exp(np.append(inner.ravel(), edges[-1]))
+    fine: Array = np.exp(np.append(inner.ravel(), edges[-1]))
+    return fine
 
 
 def _sine_integral(k: Array, g: Array, s: Array) -> Array:
