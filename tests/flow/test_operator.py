@@ -1,6 +1,7 @@
 """One operator: against exact theory, against marches, against the whole body, and direct against adjoint."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -88,8 +89,9 @@ def test_a_small_marched_oscillation_is_the_frequency_response(k: float) -> None
 
 
 def test_at_k_zero_the_operator_gives_the_derivatives_of_moving_frame_and_indicial_response() -> None:
+    """By differences so small that the limiter, which wakes as they pass about 1e-3 on this mesh, plays no part."""
     table = operator.derivatives(plate_response()).select(k=None)
-    steady = moving_frame.run(plate(), CONDITION, ("alpha", "q"), amplitudes={"alpha": 1e-3, "q": 1e-3}, second=None)
+    steady = moving_frame.run(plate(), CONDITION, ("alpha", "q"), amplitudes={"alpha": 1e-4, "q": 1e-4}, second=None)
     for name in ("CN_alpha", "Cm_alpha", "CN_q", "Cm_q"):
         assert steady[name] == pytest.approx(table.value(name), rel=1e-4)
     steps = marched_steps()
@@ -197,3 +199,11 @@ def test_a_flow_that_has_not_converged_is_not_linearised() -> None:
     solver = FiniteVolumeSolver(plate().mesh, REFERENCE, FlowSettings(steady_tolerance=1e-2))
     with pytest.raises(InputError, match="steady_tolerance"):
         solver.frequency_response(FlightCondition(2.0, alpha=0.05), [0.1])
+
+
+def test_more_memory_than_there_is_is_refused_before_anything_is_solved(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("indicial.cfd.memory.psutil.virtual_memory", lambda: SimpleNamespace(available=10**6))
+    with pytest.raises(InputError, match=r"GB of memory, 0\.0 GB are available"):
+        FiniteVolumeSolver(plate().mesh, REFERENCE)
+    with pytest.raises(InputError, match="linearised flow on"):
+        plate().linearise(CONDITION)

@@ -15,12 +15,14 @@ from indicial.cfd.adjoint import sensitivities
 from indicial.cfd.field import FlowField
 from indicial.cfd.flow.gas import GAMMA, P
 from indicial.cfd.flow.grid import OUTFLOW, SYMMETRY, Grid
+from indicial.cfd.flow.jacobian import Jacobian
 from indicial.cfd.flow.residual import MeshMotion, Residual
 from indicial.cfd.frequency_sweep import frequency_response
 from indicial.cfd.march.checkpoint import Checkpoint
 from indicial.cfd.march.ilu import Pattern
 from indicial.cfd.march.steady import Progress, SteadyState, converge
 from indicial.cfd.march.unsteady import march
+from indicial.cfd.memory import operator_bytes, require, steady_bytes
 from indicial.cfd.mesh import Mesh
 from indicial.cfd.operator import ANTISYMMETRIC, SYMMETRIC, FlowOperator
 from indicial.conventions import Array, ReferenceQuantities, mesh_from_body
@@ -96,6 +98,7 @@ class FiniteVolumeSolver:
         self._folder = folder
         self._progress = progress
         self.grid = Grid.from_mesh(mesh, reference)
+        require(steady_bytes(self.grid), f"the flow on {mesh.n_cells} cells")
         self._residual = Residual(self.grid)
         self._pattern = Pattern.of(self.grid)
         self._states: dict[str, SteadyState] = {}
@@ -215,10 +218,12 @@ class FiniteVolumeSolver:
         self._residual(state.q, state.motion)
         baseline = self._coefficients(*self._residual.forces(AMBIENT_PRESSURE), condition)
         pattern = Pattern.wide(self.grid)
+        require(operator_bytes(self.grid, len(pattern.indices)), f"the linearised flow on {self.grid.n_cells} cells")
+        jacobian = Jacobian(self._residual, state.q, state.motion)
         symmetries: tuple[float | None, ...] = (SYMMETRIC, ANTISYMMETRIC) if self._mirrored else (None,)
         return tuple(
             FlowOperator(
-                self._residual,
+                jacobian,
                 pattern,
                 state,
                 baseline,

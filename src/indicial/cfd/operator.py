@@ -26,7 +26,6 @@ from numpy.typing import NDArray
 
 from indicial.cfd.flow.gas import conservative_jacobian
 from indicial.cfd.flow.jacobian import Jacobian
-from indicial.cfd.flow.residual import Residual
 from indicial.cfd.march.ilu import Pattern
 from indicial.cfd.march.krylov import gmres
 from indicial.cfd.march.preconditioner import TwoLevel
@@ -75,7 +74,8 @@ class FlowOperator:
 
     Parameters
     ----------
-    residual : Residual
+    jacobian : Jacobian
+        At `state`; both halves of a symmetric flow share it.
     pattern : Pattern
         `Pattern.wide` of the grid.
     state : SteadyState
@@ -99,7 +99,7 @@ class FlowOperator:
 
     def __init__(
         self,
-        residual: Residual,
+        jacobian: Jacobian,
         pattern: Pattern,
         state: SteadyState,
         baseline: Array,
@@ -118,8 +118,8 @@ class FlowOperator:
         self._pattern, self._parity = pattern, SYMMETRIC if symmetry is None else symmetry
         self._halved, self._planar = symmetry is not None, planar
         self._motion = state.motion
-        self._grid = residual.grid
-        self.jacobian = Jacobian(residual, state.q, state.motion)
+        self._grid = jacobian.grid
+        self.jacobian = jacobian
         self._mass = (2.0 * condition.mach * self._grid.volume)[:, None, None] * conservative_jacobian(state.q)
         self._preconditioners: dict[complex, TwoLevel] = {}
         step = 2.0 * condition.mach * local_time_step(self._grid, state.q, state.motion)
