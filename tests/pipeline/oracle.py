@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from indicial.cfd import ConvergenceHistory
 from indicial.conventions import Array, ReferenceQuantities
 from indicial.errors import DivergenceError
 from indicial.history import History
@@ -69,8 +70,10 @@ class _Logged:
         self._note(str(motion.describe()["kind"]))
         return self.solver.unsteady(condition, motion, times)
 
-    def convergence(self, condition: FlightCondition, rates: Rates = Rates()) -> Array:
-        return np.logspace(0, -9, 10)
+    def convergence(self, condition: FlightCondition, rates: Rates = Rates()) -> ConvergenceHistory:
+        return ConvergenceHistory(
+            np.logspace(0, -9, 10), np.full(10, 1e8), np.arange(10), np.ones(10, dtype=bool), 1e-15
+        )
 
     def _note(self, what: str) -> None:
         self.progress(0.5)

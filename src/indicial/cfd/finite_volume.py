@@ -19,6 +19,7 @@ from indicial.cfd.flow.jacobian import Jacobian
 from indicial.cfd.flow.residual import MeshMotion, Residual
 from indicial.cfd.frequency_sweep import frequency_response
 from indicial.cfd.march.checkpoint import Checkpoint
+from indicial.cfd.march.convergence import ConvergenceHistory
 from indicial.cfd.march.ilu import Pattern
 from indicial.cfd.march.steady import Progress, SteadyState, converge
 from indicial.cfd.march.unsteady import march
@@ -48,21 +49,24 @@ class FlowSettings:
     Parameters
     ----------
     steady_tolerance : float
-        Residual of a steady state relative to that of still air under the same motion.
+        Residual of a steady state relative to that of still air under the same motion; where round-off leaves more
+        than that, what it leaves is wanted.
     steady_iterations : int
-        Newton steps allowed to reach it.
+        Newton steps allowed to each of its phases, the first-order and the second-order one.
     unsteady_tolerance : float
         Residual left by each time step relative to the largest change that the motion makes to the residual.
     """
 
-    steady_tolerance: float = 1e-9
-    steady_iterations: int = 120
+    steady_tolerance: float = 1e-10
+    steady_iterations: int = 200
     unsteady_tolerance: float = 2e-4
 
     def __post_init__(self) -> None:
         for name in ("steady_tolerance", "unsteady_tolerance"):
             if not 0.0 < getattr(self, name) < 1.0:
                 raise InputError(f"{name} is {getattr(self, name)}, must lie between 0 and 1")
+        if not self.steady_iterations >= 1:
+            raise InputError(f"steady_iterations is {self.steady_iterations}, must be at least 1")
 
 
 class FiniteVolumeSolver:
@@ -125,9 +129,9 @@ class FiniteVolumeSolver:
         self._residual(state.q, state.motion)
         coefficients = self._coefficients(*self._residual.forces(AMBIENT_PRESSURE), condition)
         convergence: dict[str, float | int | str] = {
-            "residual": float(state.residuals[-1]),
-            "iterations": len(state.residuals) - 1,
-            "jacobian_products": state.products,
+            "residual": float(state.history.residual[-1]),
+            "iterations": state.history.steps,
+            "jacobian_products": int(state.history.products[-1]),
             "cells": self.grid.n_cells,
         }
         return SteadyLoads(coefficients, condition, rates, self._reference, convergence)
@@ -210,10 +214,10 @@ class FiniteVolumeSolver:
         """
         motion = SteadyMotion(condition, rates)
         state = self._state(condition, motion.velocity(0.0), motion.rate(0.0))
-        if not state.residuals[-1] <= LINEARISED_FROM:
+        if not state.history.residual[-1] <= LINEARISED_FROM:
             raise InputError(
-                f"the steady state has a residual of {state.residuals[-1]:.1e}: to be linearised about it must be "
-                f"below {LINEARISED_FROM:.0e}; set a smaller steady_tolerance"
+                f"the steady state has a residual of {state.history.residual[-1]:.1e}: to be linearised about it "
+                f"must be below {LINEARISED_FROM:.0e}; set a smaller steady_tolerance"
             )
         self._residual(state.q, state.motion)
         baseline = self._coefficients(*self._residual.forces(AMBIENT_PRESSURE), condition)
@@ -275,10 +279,10 @@ class FiniteVolumeSolver:
         self._residual(state.q, state.motion)
         return FlowField.of(self.mesh, self.grid, self._reference, condition, state, self._residual.face_flux)
 
-    def convergence(self, condition: FlightCondition, rates: Rates = Rates()) -> Array:
-        """Residual after each Newton step of a steady state, relative to that of still air under the motion."""
+    def convergence(self, condition: FlightCondition, rates: Rates = Rates()) -> ConvergenceHistory:
+        """How a steady state converged: residual, pseudo-time step and products with J, step by step."""
         motion = SteadyMotion(condition, rates)
-        return self._state(condition, motion.velocity(0.0), motion.rate(0.0)).residuals
+        return self._state(condition, motion.velocity(0.0), motion.rate(0.0)).history
 
     def _mesh_motion(self, condition: FlightCondition, velocity: Array, rate: Array) -> MeshMotion:
         """V_b and omega in solver units and mesh axes."""
@@ -304,12 +308,12 @@ class FiniteVolumeSolver:
             stored = self._stored(key)
             checkpoint = stored.load() if stored is not None else None
             if checkpoint is not None:
-                found = SteadyState(checkpoint["q"], motion, checkpoint["residuals"], int(checkpoint["products"]))
+                found = SteadyState(checkpoint["q"], motion, ConvergenceHistory.from_arrays(checkpoint))
             else:
                 found = self._converged(motion, key)
                 self._check_outflow(found)
                 if stored is not None:
-                    stored.save(q=found.q, residuals=found.residuals, products=np.array(found.products))
+                    stored.save(q=found.q, **found.history.to_arrays())
             self._states[key] = found
         return self._states[key]
 

@@ -22,7 +22,7 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Protocol, Self, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, Self, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,6 +34,9 @@ from indicial.files import write_text
 from indicial.history import History
 from indicial.motion import FlightCondition, Motion, Rates, SteadyMotion
 from indicial.solver import Solver, SteadyLoads
+
+if TYPE_CHECKING:
+    from indicial.cfd import ConvergenceHistory
 
 log = logging.getLogger(__name__)
 
@@ -62,8 +65,8 @@ class SolverFactory(Protocol):
 class TellsConvergence(Protocol):
     """A solver that can show how a steady state converged."""
 
-    def convergence(self, condition: FlightCondition, rates: Rates = ...) -> Array:
-        """Residual after each iteration, shape (n,)."""
+    def convergence(self, condition: FlightCondition, rates: Rates = ...) -> ConvergenceHistory:
+        """Residual, pseudo-time step and work, step by step."""
         ...
 
 
@@ -249,7 +252,8 @@ class _Worker:
             "convergence": loads.convergence,
         }
         if isinstance(solver, TellsConvergence):
-            content["residuals"] = solver.convergence(experiment.condition, rates).tolist()
+            history = solver.convergence(experiment.condition, rates)
+            content["history"] = {name: values.tolist() for name, values in history.to_arrays().items()}
         write_text(path, json.dumps(content, indent=1))
 
     def _solver(self, whole: bool) -> Solver:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from indicial.cfd import ConvergenceHistory
 from indicial.cfd.mesh import Mesh
 from indicial.derivatives import DerivativeTable
 from indicial.errors import InputError
@@ -183,30 +184,30 @@ def _mesh_and_flow(context: Context, results: dict[str, Any], rows: list[Compari
 
 
 def _moving_frame(context: Context, results: dict[str, Any], rows: list[ComparisonRow]) -> Chapter:
-    residuals = dict(_residuals(context))
+    histories = dict(_histories(context))
     text = [
         "Derivatives are differences of steady solutions in axes that move with the body, at constant angle of attack "
         "and constant rate."
     ]
-    if not residuals:
+    if not histories:
         return Chapter("Moving frame", text)
     caption = (
-        "How the steady states converged. The one at rest goes through the first-order scheme first, and jumps where "
-        "the second-order one takes over; the others start from it."
+        "How the steady states converged, over Newton steps and over the work they took. An impulsive start goes "
+        "through the first-order scheme (dotted) to the second-order one; the others start near a state that is known."
     )
     return Chapter(
         "Moving frame",
         text,
         (),
-        [_picture(context, "convergence", lambda: convergence_figure(residuals), caption)],
+        [_picture(context, "convergence", lambda: convergence_figure(histories), caption)],
     )
 
 
-def _residuals(context: Context) -> Iterator[tuple[str, np.ndarray]]:
+def _histories(context: Context) -> Iterator[tuple[str, ConvergenceHistory]]:
     for file in sorted(context.folder.experiments.glob("*.json")):
         content = json.loads(file.read_text(encoding="utf-8"))
-        if "residuals" in content:
-            yield content["experiment"], np.array(content["residuals"])
+        if "history" in content:
+            yield content["experiment"], ConvergenceHistory.from_arrays(content["history"])
 
 
 def _oscillations(context: Context, results: dict[str, Any], rows: list[ComparisonRow]) -> Chapter:

@@ -14,26 +14,26 @@ from indicial.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY,
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from indicial.cfd import ConvergenceHistory
+
 PAIR = ("CN", "Cm")
 
 
-def convergence_figure(residuals: Mapping[str, Array]) -> Figure:
-    """Residual against Newton iteration, one line for each steady state.
+def convergence_figure(histories: Mapping[str, ConvergenceHistory]) -> Figure:
+    """Residual over Newton steps and over products with J, one line for each steady state.
 
     Parameters
     ----------
-    residuals : mapping
-        Residual relative to that of still air under the same motion, by the experiment's label.
+    histories : mapping
+        By the experiment's label.
     """
     with figure_style() as plt:
         figure: Figure
-        figure, axes = plt.subplots(figsize=(7.5, 4.2))
-        for label, values in residuals.items():
-            axes.semilogy(np.arange(len(values)), values, marker=".", lw=1.0, label=label)
-        axes.set_xlabel("Newton iteration")
-        axes.set_ylabel("residual / residual of still air")
-        axes.set_title("Steady states (from rest: first order, then, at the jump, second)")
-        axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        figure, panels = plt.subplots(1, 2, sharey=True, figsize=(9.0, 4.2))
+        for label, history in histories.items():
+            history.plot((panels[0], panels[1]), label)
+        figure.suptitle("Steady states: dotted, the first-order phase of a start from rest")
+        figure.legend(fontsize=8, loc="outside right center")
         return figure
 
 

@@ -1,9 +1,21 @@
 """Steady and unsteady solution of the flow residual."""
 
+from indicial.cfd.march.convergence import ConvergenceHistory
 from indicial.cfd.march.ilu import BlockILU, Pattern
 from indicial.cfd.march.krylov import KrylovResult, gmres
 from indicial.cfd.march.preconditioner import TwoLevel
 from indicial.cfd.march.steady import SteadyState, converge
 from indicial.cfd.march.unsteady import March, march
 
-__all__ = ["BlockILU", "KrylovResult", "March", "Pattern", "SteadyState", "TwoLevel", "converge", "gmres", "march"]
+__all__ = [
+    "BlockILU",
+    "ConvergenceHistory",
+    "KrylovResult",
+    "March",
+    "Pattern",
+    "SteadyState",
+    "TwoLevel",
+    "converge",
+    "gmres",
+    "march",
+]
