@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from indicial.cfd.flow.grid import Grid
-from indicial.cfd.march import BlockILU, Pattern, gmres
+from indicial.cfd.march import BlockILU, KnownSolutions, Pattern, gmres
 from indicial.cfd.mesh import box_mesh
 from indicial.conventions import ReferenceQuantities
 from indicial.errors import DivergenceError, InputError
@@ -140,3 +140,55 @@ def test_what_is_not_finite_is_refused() -> None:
     pattern = pattern_of((3, 1, 1))
     with pytest.raises(DivergenceError, match="cell 0"):
         BlockILU(pattern, np.zeros((len(pattern.indices), 5, 5)))
+
+
+def shifted_systems() -> tuple[np.ndarray, np.ndarray]:
+    """J and a diagonal E of 60 unknowns."""
+    return np.eye(60) * 4.0 + random((60, 60), float) / 3.0, np.diag(np.linspace(0.5, 1.5, 60))
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.7, 0.4j], ids=["k = 0", "real shift", "imaginary shift"])
+def test_a_guess_from_known_solutions_is_exact_for_what_they_combine_to(shift: complex) -> None:
+    """Solutions found at any shift, and the conjugates of complex ones."""
+    j, e = shifted_systems()
+    known = KnownSolutions(lambda x: (e @ x.ravel()).reshape(x.shape))
+    a = j + shift * e
+    assert known.guess(random((12, 5), float)) is None
+    found = [np.linalg.solve(j + s * e, random((60,), float, seed=n)) for n, s in enumerate([0.0, 0.3j, 1.0])]
+    for x in found:
+        known.add(x.reshape(12, 5), (j @ x).reshape(12, 5))
+    assert len(known) == 4
+    x = 2.0 * found[0] - 3.0 * np.conj(found[1]) + found[2]
+    guess = known.guess((a @ x).reshape(12, 5), shift)
+    assert guess is not None
+    assert guess.ravel() == pytest.approx(x, rel=1e-9)
+
+
+def test_known_solutions_spare_a_frequency_sweep_products_and_change_no_result() -> None:
+    j, e = shifted_systems()
+    b = random((12, 5), float, seed=3)
+    known = KnownSolutions(lambda x: (e @ x.ravel()).reshape(x.shape))
+    plain = spared = 0
+    for omega in np.linspace(0.0, 2.0, 11):
+        shift = 1j * omega
+        a = j + shift * e
+
+        def apply(x: np.ndarray, a: np.ndarray = a) -> np.ndarray:
+            return (a @ x.ravel()).reshape(x.shape)
+
+        without = gmres(apply, lambda x: x, b.astype(complex), 1e-9)
+        result = gmres(apply, lambda x: x, b.astype(complex), 1e-9, start=known.guess(b.astype(complex), shift))
+        known.add(result.x, b - shift * (e @ result.x.ravel()).reshape(b.shape))
+        assert result.x.ravel() == pytest.approx(np.linalg.solve(a, b.ravel()), rel=1e-7, abs=1e-9)
+        plain, spared = plain + without.products, spared + result.products
+    assert spared < 0.75 * plain
+
+
+def test_only_the_latest_solutions_are_kept() -> None:
+    known = KnownSolutions(lambda x: x, most=3)
+    for n in range(5):
+        x = random((4, 5), complex, seed=n)
+        known.add(x, 2.0 * x)
+    assert len(known) == 3
+    latest = random((4, 5), complex, seed=4)
+    assert known.guess(2.0 * latest) == pytest.approx(latest)

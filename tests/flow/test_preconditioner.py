@@ -158,6 +158,16 @@ def test_hard_solves_take_less_than_half_the_products_of_the_compact_factors() -
     assert after < before / 2
 
 
+def test_waves_that_a_coarse_far_field_does_not_resolve_do_not_upset_the_factors() -> None:
+    """At k = 0.01 a wave is 600 chords long, the cells 500 chords away are 50 chords long."""
+    mesh = airfoil_mesh(Airfoil.naca("0012"), n_around=64, n_normal=32, farfield=500.0)
+    jacobian, b = steady_jacobian(mesh, ReferenceQuantities(1.0, 1.0, (0.25, 0.0, 0.0)), 0.5)
+    state = np.broadcast_to(STILL_AIR, (jacobian.grid.n_cells, 5))
+    mass = 0.01j * jacobian.grid.volume[:, None, None] * conservative_jacobian(state)
+    before, after = products(jacobian, b, mass)
+    assert after < before / 2
+
+
 def test_a_cone_at_supersonic_speed_takes_less_than_half_the_products_too() -> None:
     cone = Cone(10.0)
     mesh = cone_mesh(cone, 0.6, mach=2.0)

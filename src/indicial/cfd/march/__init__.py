@@ -2,6 +2,7 @@
 
 from indicial.cfd.march.convergence import ConvergenceHistory
 from indicial.cfd.march.ilu import BlockILU, Pattern
+from indicial.cfd.march.known_solutions import KnownSolutions
 from indicial.cfd.march.krylov import KrylovResult, gmres
 from indicial.cfd.march.preconditioner import TwoLevel
 from indicial.cfd.march.steady import SteadyState, converge
@@ -10,6 +11,7 @@ from indicial.cfd.march.unsteady import March, march
 __all__ = [
     "BlockILU",
     "ConvergenceHistory",
+    "KnownSolutions",
     "KrylovResult",
     "March",
     "Pattern",
