@@ -17,6 +17,16 @@ class Figure:
     target: str | None = None
     holds: bool | None = None
 
+    @classmethod
+    def at_most(cls, name: str, value: float, limit: float, unit: str = "") -> Figure:
+        """A figure that holds up to `limit`."""
+        return cls(name, value, unit, f"at most {limit:g}", value <= limit)
+
+    @classmethod
+    def at_least(cls, name: str, value: float, limit: float, unit: str = "") -> Figure:
+        """A figure that holds from `limit` on."""
+        return cls(name, value, unit, f"at least {limit:g}", value >= limit)
+
     def line(self) -> str:
         """The figure for a reader."""
         verdict = "" if self.holds is None else ("  holds" if self.holds else "  FALLS SHORT")
