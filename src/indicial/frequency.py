@@ -64,6 +64,8 @@ class FrequencyResponse:
         The six coefficients of the steady state, shape (6,).
     condition : FlightCondition
     reference : ReferenceQuantities
+    plane : bool
+        Whether the flow is two-dimensional.
     provenance : dict
         How it was made (plain values).
     """
@@ -77,6 +79,7 @@ class FrequencyResponse:
     baseline: Array
     condition: FlightCondition
     reference: ReferenceQuantities
+    plane: bool = False
     provenance: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -123,6 +126,7 @@ class FrequencyResponse:
             "schema_version": SCHEMA_VERSION,
             "condition": json.dumps(asdict(self.condition)),
             "reference": json.dumps(self.reference.to_dict()),
+            "plane": int(self.plane),
             "provenance": json.dumps(self.provenance),
         }
         return xr.Dataset(data, coords, attrs)
@@ -150,6 +154,7 @@ class FrequencyResponse:
             **{name: data[name].values for name in ("static", "slope", "direct", "baseline")},
             condition=FlightCondition(**json.loads(data.attrs["condition"])),
             reference=ReferenceQuantities.from_dict(json.loads(data.attrs["reference"])),
+            plane=bool(data.attrs["plane"]),
             provenance=json.loads(data.attrs["provenance"]),
         )
 

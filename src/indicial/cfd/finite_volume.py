@@ -234,7 +234,7 @@ class FiniteVolumeSolver:
                 condition,
                 self._reference,
                 symmetry=symmetry,
-                planar=not self._mirrored and bool(np.any(self.grid.kind == SYMMETRY)),
+                plane=not self._mirrored and bool(np.any(self.grid.kind == SYMMETRY)),
                 tolerance=tolerance,
             )
             for symmetry in symmetries

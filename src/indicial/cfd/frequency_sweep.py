@@ -101,6 +101,7 @@ def frequency_response(
         baseline=first.baseline,
         condition=first.condition,
         reference=first.reference,
+        plane=first.plane,
         provenance=provenance | asdict(spent),
     )
 

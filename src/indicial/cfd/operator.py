@@ -86,7 +86,7 @@ class FlowOperator:
     reference : ReferenceQuantities
     symmetry : {None, 1, -1}
         None where nothing cuts the body; on half a body, 1 for the symmetric operator, -1 for the antisymmetric one.
-    planar : bool
+    plane : bool
         A two-dimensional flow: inputs alpha and q only.
     tolerance : float
         Residual of a solution relative to its right-hand side.
@@ -107,7 +107,7 @@ class FlowOperator:
         reference: ReferenceQuantities,
         *,
         symmetry: float | None = None,
-        planar: bool = False,
+        plane: bool = False,
         tolerance: float = 1e-8,
     ) -> None:
         if not 0.0 < tolerance < 1.0:
@@ -116,7 +116,7 @@ class FlowOperator:
         self.tolerance = tolerance
         self.spent = SolveCount()
         self._pattern, self._parity = pattern, SYMMETRIC if symmetry is None else symmetry
-        self._halved, self._planar = symmetry is not None, planar
+        self._halved, self.plane = symmetry is not None, plane
         self._motion = state.motion
         self._grid = jacobian.grid
         self.jacobian = jacobian
@@ -126,8 +126,8 @@ class FlowOperator:
         self._cell_rate = 1.0 / float(np.median(step))
         if symmetry is None:
             both = _INPUTS[SYMMETRIC] + _INPUTS[ANTISYMMETRIC]
-            self.inputs: tuple[str, ...] = _INPUTS[SYMMETRIC] if planar else both
-            self.outputs: tuple[str, ...] = _OUTPUTS[SYMMETRIC] if planar else COEFFICIENTS
+            self.inputs: tuple[str, ...] = _INPUTS[SYMMETRIC] if plane else both
+            self.outputs: tuple[str, ...] = _OUTPUTS[SYMMETRIC] if plane else COEFFICIENTS
         else:
             self.inputs, self.outputs = _INPUTS[symmetry], _OUTPUTS[symmetry]
 
@@ -145,7 +145,7 @@ class FlowOperator:
     def allowed_axes(self) -> NDArray[np.bool_]:
         """Which components of (V_b, omega), mesh axes, belong to this operator, (6,)."""
         symmetric = np.array([True, False, True, False, True, False])
-        if self._planar:
+        if self.plane:
             return symmetric
         if not self._halved:
             return np.ones(6, dtype=bool)

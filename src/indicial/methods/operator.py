@@ -8,8 +8,7 @@ transfer functions of `indicial.frequency`,
 so ``C_jq + C_jad`` of a forced pitch oscillation at k is exactly ``Im(H_a(ik) + ik H_q(ik))/k``. Linear by nature: the
 effects of a finite amplitude are the business of `forced_oscillation` and `reduced_frequency`.
 
-In subsonic flow ``H_a'(0)`` need not exist: in two dimensions it grows like log k, and what a bounded mesh gives at
-k = 0 is a property of the mesh. So below Mach 1 two more frequencies are solved and the trend is looked at.
+In two-dimensional subsonic flow ``H_a'(0)`` of a load exists only where its static derivative is zero: see `refusals`.
 """
 
 from __future__ import annotations
@@ -34,10 +33,8 @@ LOADS = {
 }
 """The loads read for each input: longitudinal with longitudinal, lateral with lateral."""
 
-PROBES = (0.01, 0.02)
-"""Reduced frequencies at which the trend of the out-of-phase part towards k = 0 is looked at below Mach 1."""
-
-_NEGLIGIBLE = 0.01
+_NO_LIFT = 1e-3
+"""Largest static derivative, relative to CN_alpha, of a load that is counted as one which the wake does not change."""
 
 
 def run(
@@ -53,10 +50,7 @@ def run(
     InputError
         If a frequency is negative or not finite, or the flow has no such input.
     """
-    ks = reduced_frequencies(k)
-    if condition.mach < 1.0:
-        ks = np.union1d(ks, PROBES)
-    return solver.frequency_response(condition, ks, inputs)
+    return solver.frequency_response(condition, reduced_frequencies(k), inputs)
 
 
 def derivatives(response: FrequencyResponse, source: str = "linearised flow") -> DerivativeTable:
@@ -92,27 +86,23 @@ def value(response: FrequencyResponse, name: str) -> float:
 def refusals(response: FrequencyResponse) -> dict[str, str]:
     """Derivatives that have no limit as k goes to 0, with the reason.
 
-    The out-of-phase part ``g(k) = Im H(ik)/k`` of a flow that forgets fast enough is even and smooth in k, so it
-    changes by four times less with each halving of k. One that changes by as much between 0 and k as between k and 2k
-    has not settled: the number at k = 0 then shows how far the mesh reaches.
+    In two-dimensional subsonic flow the vortices shed into the wake induce a downwash that dies out as 1/s. When it
+    has become even over the section it acts as a change of alpha, so each load lags in proportion to its own static
+    derivative, the integral (17) of the lag grows like log s and ``Im H(ik)/k`` like log k. Only a load that alpha does
+    not change, such as the moment about the aerodynamic centre, has a limit; what the mesh gives for the others at
+    k = 0 shows how far the mesh reaches.
     """
-    at = [np.flatnonzero(np.isclose(response.k, probe)) for probe in PROBES]
-    if response.condition.mach >= 1.0 or any(found.size == 0 for found in at):
+    if response.condition.mach >= 1.0 or not response.plane or "alpha" not in response.inputs:
         return {}
-    refused = {}
-    for motion in (name for name in ("alpha", "beta") if name in response.inputs):
-        for load in LOADS[motion]:
-            h = response.channel(load, motion)
-            limit = response.at_zero(load, motion)[1]
-            near, far = (float(h[found[0]].imag) / probe for found, probe in zip(at, PROBES, strict=True))
-            scale = max(abs(limit), abs(far), abs(response.at_zero(load, motion)[0]))
-            if abs(near - limit) > max(0.5 * abs(far - near), _NEGLIGIBLE * scale):
-                name = f"{load}_{motion}dot"
-                refused[name] = (
-                    f"{name} has no limit as k goes to 0: out of phase {far:.4g} at k = {PROBES[1]:g}, {near:.4g} at "
-                    f"k = {PROBES[0]:g}, {limit:.4g} at 0 on this mesh; ask for a value at a reduced frequency"
-                )
-    return refused
+    slopes = {load: response.at_zero(load, "alpha")[0] for load in LOADS["alpha"]}
+    return {
+        f"{load}_alphadot": (
+            f"{load}_alphadot has no limit as k goes to 0: the wake of a two-dimensional subsonic flow makes it grow like "
+            f"log k, as {load}_alpha = {slope:.3g} is not zero; ask for values at reduced frequencies above 0"
+        )
+        for load, slope in slopes.items()
+        if abs(slope) > _NO_LIFT * abs(slopes["CN"])
+    }
 
 
 def _values(response: FrequencyResponse, load: str, motion: str, k: float | None) -> dict[str, float]:
