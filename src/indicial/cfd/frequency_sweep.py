@@ -13,41 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from indicial.cfd.march.known_solutions import KnownSolutions
 from indicial.cfd.march.steady import Progress
 from indicial.cfd.operator import FlowOperator, SolveCount
 from indicial.conventions import COEFFICIENTS, Array
 from indicial.errors import InputError
 from indicial.frequency import FrequencyResponse, check_inputs, reduced_frequencies
 
-_KEPT = 24
-"""Most solutions (real vectors) kept to start others from: three vectors each, of the flow's size."""
-
 _TRANSLATIONS = {"alphadot": "alpha"}
-
-
-class _Recycled:
-    """Solutions x of one right-hand side at several shifts, with E x and J x: where the next solution starts."""
-
-    def __init__(self, operator: FlowOperator) -> None:
-        self._operator = operator
-        self._x: list[Array] = []
-        self._ex: list[Array] = []
-        self._jx: list[Array] = []
-
-    def add(self, x: NDArray[Any]) -> None:
-        for part in (x.real, x.imag) if np.iscomplexobj(x) else (x,):
-            vector = np.ascontiguousarray(part)
-            self._x.append(vector)
-            self._ex.append(self._operator.apply_mass(vector))
-            self._jx.append(self._operator.apply(vector))
-        del self._x[:-_KEPT], self._ex[:-_KEPT], self._jx[:-_KEPT]
-
-    def start(self, rhs: Array, shift: complex) -> NDArray[Any]:
-        """The combination whose residual at `shift` is least."""
-        images = np.stack(self._jx, axis=1) + shift * np.stack(self._ex, axis=1)
-        weights = np.linalg.lstsq(images, rhs.astype(complex), rcond=1e-12)[0]
-        combined: NDArray[Any] = np.stack(self._x, axis=1) @ weights
-        return combined
 
 
 def frequency_response(
@@ -121,30 +94,33 @@ def _channels(
 ) -> dict[str, _Channel]:
     """Frequency by frequency, so that all inputs share a frequency's factorisation."""
     rows = [COEFFICIENTS.index(output) for output in operator.outputs]
-    found, recycled = {}, {}
+    known = KnownSolutions(lambda x: operator.apply_mass(x.ravel()).reshape(-1, 5))
+
+    def solve(rhs: Array, shift: complex = 0.0) -> NDArray[Any]:
+        guess = known.guess(rhs.reshape(-1, 5), shift)
+        x = operator.solve(rhs, shift, start=None if guess is None else guess.ravel())
+        image = rhs - shift * operator.apply_mass(x) if shift else rhs
+        known.add(x.reshape(-1, 5), image.reshape(-1, 5))
+        return x
+
+    found = {}
     for name in names:
         j = operator.inputs.index(name)
         static, slope, direct = np.zeros(6), np.zeros(6), np.zeros(6)
-        x0 = operator.solve(-operator.b[:, j])
-        x1 = operator.solve(-operator.apply_mass(x0))
+        x0 = solve(-operator.b[:, j])
+        x1 = solve(-operator.apply_mass(x0))
         direct[rows] = operator.d[:, j]
         static[rows] = operator.d[:, j] + operator.c @ x0
         slope[rows] = operator.c @ x1
         found[name] = _Channel(np.zeros((len(ks), 6), dtype=complex), static, slope, direct)
-        recycled[name] = _Recycled(operator)
-        recycled[name].add(x0)
-        recycled[name].add(x1)
     for done, m in enumerate(np.argsort(ks, kind="stable")):
         shift = 1j * float(ks[m])
         for name in names:
-            j = operator.inputs.index(name)
-            if ks[m] == 0.0:
+            if shift == 0.0:
                 found[name].values[m] = found[name].static
                 continue
-            rhs = -operator.b[:, j]
-            x = operator.solve(rhs, shift, start=recycled[name].start(rhs, shift))
-            recycled[name].add(x)
-            found[name].values[m, rows] = operator.d[:, j] + operator.c @ x
+            j = operator.inputs.index(name)
+            found[name].values[m, rows] = operator.d[:, j] + operator.c @ solve(-operator.b[:, j], shift)
         if progress is not None:
             progress((done + 1) / len(ks))
     return found

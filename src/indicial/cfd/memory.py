@@ -14,7 +14,7 @@ _BLOCK, _STATE, _GRADIENT = 25, 5, 15
 _REAL, _COMPLEX = 8, 16
 
 
-def operator_bytes(grid: Grid, entries: int, *, restart: int = 80, kept: int = 72) -> int:
+def operator_bytes(grid: Grid, entries: int, *, restart: int = 80, kept: int = 24) -> int:
     """Most bytes that the linearised flow on `grid` takes at a time, complex solves included.
 
     Parameters
@@ -24,7 +24,7 @@ def operator_bytes(grid: Grid, entries: int, *, restart: int = 80, kept: int = 7
     restart : int
         Krylov vectors.
     kept : int
-        Solutions from which others start; each has two images.
+        Solutions from which others start; each has an image, and once more for a guess.
     """
     faces, cells = len(grid.owner), grid.n_cells
     real = faces * _DERIVATIVES + cells * (2 * _BLOCK + 2 * _GRADIENT + 3 * kept * _STATE)

@@ -97,8 +97,8 @@ def refusals(response: FrequencyResponse) -> dict[str, str]:
     slopes = {load: response.at_zero(load, "alpha")[0] for load in LOADS["alpha"]}
     return {
         f"{load}_alphadot": (
-            f"{load}_alphadot has no limit as k goes to 0: the wake of a two-dimensional subsonic flow makes it grow like "
-            f"log k, as {load}_alpha = {slope:.3g} is not zero; ask for values at reduced frequencies above 0"
+            f"{load}_alphadot has no limit as k goes to 0: the wake of a two-dimensional subsonic flow makes it grow "
+            f"like log k, as {load}_alpha = {slope:.3g} is not zero; ask for values at reduced frequencies above 0"
         )
         for load, slope in slopes.items()
         if abs(slope) > _NO_LIFT * abs(slopes["CN"])
