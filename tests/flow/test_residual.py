@@ -111,6 +111,11 @@ def test_gmres_solves_a_random_system_to_its_tolerance() -> None:
     assert left == pytest.approx(result.relative_residual, rel=0.5)
 
 
+def test_a_single_cell_has_no_interior_faces_and_a_residual() -> None:
+    grid = Grid.from_mesh(box_mesh((1, 1, 1)), REFERENCE)
+    assert np.max(np.abs(Residual(grid)(np.tile(STILL_AIR, (1, 1)), MOTION))) < 1e-14
+
+
 def test_the_residual_is_the_same_for_one_and_two_threads() -> None:
     import numba
 

@@ -26,10 +26,11 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from indicial.cfd.flow.face_flux import boundary_flux, mirrored
 from indicial.cfd.flow.flux import hllc
 from indicial.cfd.flow.grid import MIRROR, SYMMETRY
 from indicial.cfd.flow.reconstruction import limiter, saturate
-from indicial.cfd.flow.residual import MeshMotion, Residual, boundary_flux, gather, gradients, mirrored
+from indicial.cfd.flow.residual import MeshMotion, Residual, gather, gradients
 from indicial.conventions import Array, Index
 
 _H = 1e-40

@@ -19,6 +19,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from indicial.cfd.flow.compiled import POINTWISE
 from indicial.conventions import Array, Index
 
 SATURATION = 0.8
@@ -56,7 +57,7 @@ def least_squares_weights(steps: Array, offsets: Index) -> Array:
     return weights
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**POINTWISE)
 def limiter(a, b, eps):  # type: ignore[no-untyped-def]
     """psi(a, b) and its two slopes."""
     den = a * a + b * b + 2.0 * eps
@@ -64,10 +65,11 @@ def limiter(a, b, eps):  # type: ignore[no-untyped-def]
     return psi, 2.0 * (b - a * psi) / den, 2.0 * (a - b * psi) / den
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**POINTWISE)
 def saturate(x, q):  # type: ignore[no-untyped-def]
     """``x / sqrt(1 + (x/(beta q))^2)`` and its slopes in x and q."""
-    t = x / (SATURATION * q)
-    root = 1.0 / np.sqrt(1.0 + t * t)
+    most = SATURATION * q
+    root = most / np.sqrt(most * most + x * x)
     cube = root * root * root
+    t = x / most
     return x * root, cube, x * t * t / q * cube

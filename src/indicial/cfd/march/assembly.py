@@ -13,9 +13,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
+from indicial.cfd.flow.face_flux import mirrored
 from indicial.cfd.flow.grid import MIRROR
 from indicial.cfd.flow.jacobian import Jacobian
-from indicial.cfd.flow.residual import mirrored
 from indicial.cfd.march.ilu import Pattern
 from indicial.cfd.march.krylov import State
 
