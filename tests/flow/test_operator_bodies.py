@@ -27,7 +27,7 @@ AMPLITUDE = 2e-4
 """Of marched motions [rad]: small beside the differences at which limiter and shock begin to move."""
 
 FINNER = [pytest.param("finner", 0.45), pytest.param("finner", 1.0, marks=pytest.mark.slow)]
-BOTH = [*FINNER, pytest.param("airfoil", 48), pytest.param("airfoil", 128, marks=pytest.mark.slow)]
+BOTH = [*FINNER, pytest.param("airfoil", 24), pytest.param("airfoil", 48, marks=pytest.mark.slow)]
 
 
 @cache
@@ -48,11 +48,11 @@ def response(shape: str, fineness: float, k: tuple[float, ...]) -> FrequencyResp
 
 @pytest.mark.parametrize(("shape", "fineness"), BOTH)
 def test_a_small_marched_oscillation_is_the_frequency_response(shape: str, fineness: float) -> None:
-    """Out of phase within 0.5% at the same k."""
-    k = 0.1
+    """In and out of phase within 0.5% at the same k. The airfoil's shock takes long to forget how the motion began."""
+    k, periods, steps = (0.1, 2, 200) if shape == "finner" else (0.2, 8, 400)
     found = response(shape, fineness, (k,))
     history = forced_oscillation.run(
-        solver(shape, fineness), CONDITIONS[shape], AMPLITUDE, k, periods=2, steps_per_period=200
+        solver(shape, fineness), CONDITIONS[shape], AMPLITUDE, k, periods=periods, steps_per_period=steps
     )
     reading = forced_oscillation.fourier(history, 1)
     for load in ("CN", "Cm"):
@@ -81,8 +81,8 @@ def test_steps_rebuilt_from_the_frequency_response_equal_the_marched_ones(shape:
 
 def test_derivatives_about_a_shock_are_exact_and_adjoint_equals_direct() -> None:
     """The limiter and the flux are differentiated where they are: on a converged flow with a shock."""
-    flow, condition = solver("airfoil", 48), CONDITIONS["airfoil"]
-    operators = FiniteVolumeSolver.linearise(flow, condition, tolerance=1e-11)
+    flow, condition = solver("airfoil", 24), CONDITIONS["airfoil"]
+    operators = flow.linearise(condition, tolerance=1e-11)
     by_load, by_input = sensitivities(operators), direct_sensitivities(operators)
     for name in ("values", "accelerations"):
         found, wanted = getattr(by_load, name), getattr(by_input, name)
@@ -93,7 +93,7 @@ def test_derivatives_about_a_shock_are_exact_and_adjoint_equals_direct() -> None
 
 
 def test_the_jacobian_is_exact_about_a_shock() -> None:
-    flow, condition = solver("airfoil", 48), CONDITIONS["airfoil"]
+    flow, condition = solver("airfoil", 24), CONDITIONS["airfoil"]
     state = flow._state(condition, condition.velocity, np.zeros(3))
     x = np.random.default_rng(3).standard_normal(state.q.shape)
     exact: Array = Residual(flow.grid)(state.q + 1e-30j * x, state.motion).imag / 1e-30
@@ -102,8 +102,8 @@ def test_the_jacobian_is_exact_about_a_shock() -> None:
 
 
 def test_the_lift_of_a_plane_subsonic_flow_has_no_alphadot_derivative() -> None:
-    """Its wake makes the out-of-phase part grow like log k; the mesh's own limit is not given out for it."""
-    found = response("airfoil", 48, ())
+    """Its wake makes the out-of-phase part grow like log k; what the mesh has at k = 0 is not given out for it."""
+    found = response("airfoil", 24, ())
     assert "CN_alphadot" in operator.refusals(found)
     with pytest.raises(NoLimitError, match="no limit"):
         operator.value(found, "CN_alphadot")
