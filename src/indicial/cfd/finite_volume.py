@@ -18,6 +18,7 @@ from indicial.cfd.flow.grid import OUTFLOW, SYMMETRY, Grid
 from indicial.cfd.flow.jacobian import Jacobian
 from indicial.cfd.flow.residual import MeshMotion, Residual
 from indicial.cfd.frequency_sweep import frequency_response
+from indicial.cfd.loads import AMBIENT_PRESSURE, Cut, coefficients
 from indicial.cfd.march.checkpoint import Checkpoint
 from indicial.cfd.march.convergence import ConvergenceHistory
 from indicial.cfd.march.ilu import Pattern
@@ -35,8 +36,6 @@ from indicial.sensitivity import Sensitivities
 from indicial.solver import SteadyLoads
 
 log = logging.getLogger(__name__)
-
-AMBIENT_PRESSURE = 1.0 / GAMMA
 
 LINEARISED_FROM = 1e-6
 """Largest residual, relative to that of still air, of a steady state about which the flow is linearised."""
@@ -106,7 +105,7 @@ class FiniteVolumeSolver:
         self._residual = Residual(self.grid)
         self._pattern = Pattern.of(self.grid)
         self._states: dict[str, SteadyState] = {}
-        self._mirrored = _is_half_body(self.grid)
+        self._cut = Cut.of(self.grid)
         self._mesh_key = _mesh_key(mesh)
 
     @property
@@ -212,6 +211,8 @@ class FiniteVolumeSolver:
         InputError
             If the steady state is not converged well enough, or memory would not suffice.
         """
+        if self._cut.z:
+            raise InputError("the mesh holds a quarter of the body: a linearised flow needs half of it or the whole")
         motion = SteadyMotion(condition, rates)
         state = self._state(condition, motion.velocity(0.0), motion.rate(0.0))
         if not state.history.residual[-1] <= LINEARISED_FROM:
@@ -224,7 +225,7 @@ class FiniteVolumeSolver:
         pattern = Pattern.wide(self.grid)
         require(operator_bytes(self.grid, len(pattern.indices)), f"the linearised flow on {self.grid.n_cells} cells")
         jacobian = Jacobian(self._residual, state.q, state.motion)
-        symmetries: tuple[float | None, ...] = (SYMMETRIC, ANTISYMMETRIC) if self._mirrored else (None,)
+        symmetries: tuple[float | None, ...] = (SYMMETRIC, ANTISYMMETRIC) if self._cut.y else (None,)
         return tuple(
             FlowOperator(
                 jacobian,
@@ -234,7 +235,7 @@ class FiniteVolumeSolver:
                 condition,
                 self._reference,
                 symmetry=symmetry,
-                plane=not self._mirrored and bool(np.any(self.grid.kind == SYMMETRY)),
+                plane=self._cut.plane,
                 tolerance=tolerance,
             )
             for symmetry in symmetries
@@ -375,14 +376,8 @@ class FiniteVolumeSolver:
         return known[0].q if known and distance(known[0]) < 0.1 else None
 
     def _coefficients(self, force: Array, moment: Array, condition: FlightCondition) -> Array:
-        """(CA, CY, CN, Cl, Cm, Cn), shape (..., 6), from loads in solver units and mesh axes."""
-        c = self._reference.length
-        pressure_area = 0.5 * condition.mach**2 * self._reference.area / c**2
-        arms = self._reference.moment_lengths / c
-        out = np.concatenate([force, moment * [-1.0, 1.0, -1.0] / arms], axis=-1) / pressure_area
-        if self._mirrored:
-            out = out * [2.0, 0.0, 2.0, 0.0, 2.0, 0.0]
-        return np.asarray(out)
+        """The six coefficients of the whole body, shape (..., 6), from loads in solver units and mesh axes."""
+        return coefficients(force, moment, self._cut, condition, self._reference)
 
     def _key(self, *parts: object) -> str:
         """A name for a computation on this mesh."""
@@ -405,10 +400,3 @@ def _mesh_key(mesh: Mesh) -> str:
     for array in (mesh.points, mesh.owner, mesh.neighbour):
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()[:16]
-
-
-def _is_half_body(grid: Grid) -> bool:
-    """Whether the symmetry faces do not balance: one plane, not the two sides of a layer."""
-    faces = grid.n_interior + np.flatnonzero(grid.kind == SYMMETRY)
-    areas = grid.normal[faces] * grid.area[faces, None]
-    return bool(faces.size and np.linalg.norm(areas.sum(axis=0)) > 1e-6 * grid.area[faces].sum())
