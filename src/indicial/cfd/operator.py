@@ -38,8 +38,8 @@ log = logging.getLogger(__name__)
 
 SYMMETRIC, ANTISYMMETRIC = 1.0, -1.0
 
-SHARED = 0.03
-"""Difference of two shifts, over the rate at which waves cross a typical cell, for which one factorisation will do."""
+SHARED = 0.02
+"""Difference of two shifts, over the rate at which waves cross the large cells, for which one factorisation will do."""
 
 _INPUTS = {SYMMETRIC: ("alpha", "q"), ANTISYMMETRIC: ("beta", "p", "r")}
 _OUTPUTS = {SYMMETRIC: ("CA", "CN", "Cm"), ANTISYMMETRIC: ("CY", "Cl", "Cn")}
@@ -123,7 +123,7 @@ class FlowOperator:
         self._mass = (2.0 * condition.mach * self._grid.volume)[:, None, None] * conservative_jacobian(state.q)
         self._preconditioners: dict[complex, TwoLevel] = {}
         step = 2.0 * condition.mach * local_time_step(self._grid, state.q, state.motion)
-        self._cell_rate = 1.0 / float(np.median(step))
+        self._slow_rate = 1.0 / float(np.quantile(step, 0.95))
         if symmetry is None:
             both = _INPUTS[SYMMETRIC] + _INPUTS[ANTISYMMETRIC]
             self.inputs: tuple[str, ...] = _INPUTS[SYMMETRIC] if plane else both
@@ -273,7 +273,7 @@ class FlowOperator:
     def _preconditioner(self, shift: complex) -> TwoLevel:
         """The factorisation for a shift, or one for a shift that differs by little beside the cells' own rates."""
         for other, made in self._preconditioners.items():
-            if abs(shift - other) <= SHARED * self._cell_rate:
+            if abs(shift - other) <= SHARED * self._slow_rate:
                 return made
         # beside that of k = 0, which serves all low frequencies, keep the last one only
         for other in [other for other in self._preconditioners if other != 0.0]:
