@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
+import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from indicial.conventions import COEFFICIENTS, Array, ReferenceQuantities
+from indicial.errors import InputError
 from indicial.frequency import FrequencyResponse
 from indicial.history import History
 from indicial.motion import FlightCondition, Motion, Rates
@@ -60,6 +62,37 @@ class Solver(Protocol):
     def unsteady(self, condition: FlightCondition, motion: Motion, times: ArrayLike) -> History:
         """Loads at `times` [s] under `motion`."""
         ...
+
+
+@runtime_checkable
+class PeriodicSolver(Protocol):
+    """Periodic motion in, periodic loads out, without a march: the reduced-frequency methods."""
+
+    @property
+    def reference(self) -> ReferenceQuantities:
+        """What the loads are made dimensionless with."""
+        ...
+
+    def periodic(self, condition: FlightCondition, motion: Motion, period: float, harmonics: int = ...) -> History:
+        """Loads at the `instants` of one period [s] of the flow that follows `motion`, truncated after `harmonics`.
+
+        There is no start: the history's `before` are its loads at t = 0.
+        """
+        ...
+
+
+def instants(harmonics: int) -> Array:
+    """Phases omega t of the N = 2h + 1 equispaced instants that tell h harmonics, from 0, shape (N,).
+
+    Raises
+    ------
+    InputError
+        If `harmonics` is not a whole number of at least 1.
+    """
+    if not (np.isfinite(harmonics) and harmonics >= 1 and harmonics % 1 == 0):
+        raise InputError(f"harmonics is {harmonics}, must be a whole number of at least 1")
+    count = 2 * int(harmonics) + 1
+    return 2.0 * np.pi * np.arange(count) / count
 
 
 class LinearisedFlow(Protocol):

@@ -21,6 +21,7 @@ from indicial.cfd.frequency_sweep import frequency_response
 from indicial.cfd.loads import AMBIENT_PRESSURE, Cut, coefficients
 from indicial.cfd.march.checkpoint import Checkpoint
 from indicial.cfd.march.convergence import ConvergenceHistory
+from indicial.cfd.march.harmonic import converge_periodic
 from indicial.cfd.march.ilu import Pattern
 from indicial.cfd.march.steady import Progress, SteadyState, converge
 from indicial.cfd.march.unsteady import march
@@ -33,7 +34,7 @@ from indicial.frequency import INPUTS, FrequencyResponse, reduced_frequencies
 from indicial.history import History
 from indicial.motion import FlightCondition, Motion, Rates, SteadyMotion
 from indicial.sensitivity import Sensitivities
-from indicial.solver import SteadyLoads
+from indicial.solver import SteadyLoads, instants
 
 log = logging.getLogger(__name__)
 
@@ -201,6 +202,69 @@ class FiniteVolumeSolver:
             },
         )
 
+    def periodic(self, condition: FlightCondition, motion: Motion, period: float, harmonics: int = 1) -> History:
+        """Loads at 2h + 1 instants of one period [s] of the flow under a periodic motion, truncated after h harmonics.
+
+        All instants are solved together, from the steady state of `condition` (time-spectral method, see
+        `indicial.cfd.march.harmonic`): there is no start to die out, and `before` holds the loads at t = 0.
+
+        Raises
+        ------
+        InputError
+            If the motion does not repeat itself after `period` or crosses the symmetry plane, or `harmonics` is not a
+            whole number of at least 1.
+        DivergenceError
+            If the flow does not converge; says where, and keeps the last states in the folder.
+        """
+        phase = instants(harmonics)
+        t = _within_period(motion, period, phase)
+        velocity, rate = motion.velocity(t), motion.rate(t)
+        motions = [self._mesh_motion(condition, v, w) for v, w in zip(velocity, rate, strict=True)]
+        for one in motions:
+            self._check_symmetry(one)
+        start = self._state(condition, condition.velocity, np.zeros(3))
+        unit = condition.speed_of_sound / self._reference.length
+        try:
+            found = converge_periodic(
+                self._residual,
+                self._pattern,
+                motions,
+                2.0 * np.pi / (period * unit),
+                start.q,
+                tolerance=self.settings.steady_tolerance,
+                iterations=self.settings.steady_iterations,
+                progress=self._progress,
+            )
+        except DivergenceError as error:
+            kept = self._keep_diverged(error, self._key(condition, velocity, rate, period))
+            message = f"{error}; {self._place(error)}{kept}"
+            raise DivergenceError(message, cell=error.cell, state=error.state) from error
+        loads = np.empty((t.size, 2, 3))
+        for n, one in enumerate(motions):
+            self._residual(found.q[n], one)
+            loads[n] = self._residual.forces(AMBIENT_PRESSURE)
+        coefficients = self._coefficients(loads[:, 0], loads[:, 1], condition)
+        return History(
+            time=t,
+            coefficients=coefficients,
+            velocity=velocity,
+            rate=rate,
+            before=coefficients[0],
+            condition=condition,
+            reference=self._reference,
+            motion=motion.describe(),
+            provenance={
+                "solver": "finite volume, Euler, second order, time-spectral",
+                "version": __version__,
+                "mesh": self._mesh_key,
+                "cells": self.grid.n_cells,
+                "harmonics": int(harmonics),
+                "jacobian_products": int(found.history.products[-1]),
+                "newton_steps": found.history.steps,
+                "residual": float(found.history.residual[-1]),
+            },
+        )
+
     def linearise(
         self, condition: FlightCondition, rates: Rates = Rates(), *, tolerance: float = 1e-8
     ) -> tuple[FlowOperator, ...]:
@@ -331,12 +395,15 @@ class FiniteVolumeSolver:
                 progress=self._progress,
             )
         except DivergenceError as error:
-            kept = ""
-            if self._folder is not None and error.state is not None:
-                path = self._folder / f"diverged-{key}.npz"
-                Checkpoint(path, key).save(q=np.asarray(error.state))
-                kept = f"; the last good state is in {path}"
-            raise DivergenceError(f"{error}; {self._place(error)}{kept}") from error
+            raise DivergenceError(f"{error}; {self._place(error)}{self._keep_diverged(error, key)}") from error
+
+    def _keep_diverged(self, error: DivergenceError, key: str) -> str:
+        """Put the last good state of a failed computation into the folder; the words that say so."""
+        if self._folder is None or error.state is None:
+            return ""
+        path = self._folder / f"diverged-{key}.npz"
+        Checkpoint(path, key).save(q=np.asarray(error.state))
+        return f"; the last good state is in {path}"
 
     def _check_outflow(self, state: SteadyState) -> None:
         """All that leaves by an outflow patch must leave faster than sound: nothing is said there of what is behind."""
@@ -392,6 +459,18 @@ class FiniteVolumeSolver:
             else:
                 digest.update(repr(part).encode())
         return digest.hexdigest()[:20]
+
+
+def _within_period(motion: Motion, period: float, phase: Array) -> Array:
+    """Times [s] of phases of a period, after which the motion must repeat itself."""
+    if not (np.isfinite(period) and period > 0.0):
+        raise InputError(f"period is {period} s, must be positive and finite")
+    t: Array = period * phase / (2.0 * np.pi)
+    for values in (motion.velocity, motion.rate):
+        now, later = values(t), values(t + period)
+        if np.max(np.abs(later - now)) > 1e-9 * np.max(np.abs(now)):
+            raise InputError(f"the motion does not repeat itself after a period of {period:.6g} s")
+    return t
 
 
 def _mesh_key(mesh: Mesh) -> str:

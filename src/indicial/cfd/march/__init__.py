@@ -1,6 +1,7 @@
 """Steady and unsteady solution of the flow residual."""
 
 from indicial.cfd.march.convergence import ConvergenceHistory
+from indicial.cfd.march.harmonic import PeriodicState, converge_periodic
 from indicial.cfd.march.ilu import BlockILU, Pattern
 from indicial.cfd.march.known_solutions import KnownSolutions
 from indicial.cfd.march.krylov import KrylovResult, gmres
@@ -15,9 +16,11 @@ __all__ = [
     "KrylovResult",
     "March",
     "Pattern",
+    "PeriodicState",
     "SteadyState",
     "TwoLevel",
     "converge",
+    "converge_periodic",
     "gmres",
     "march",
 ]
