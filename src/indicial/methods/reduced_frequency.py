@@ -119,7 +119,7 @@ class PeriodicLoads:
         Raises
         ------
         InputError
-            If the history is of another motion or shorter than one period.
+            If the history is of another motion or shorter than one period, or the load does not move.
         """
         column = _column(name)
         own, other = self.oscillation, history.motion
@@ -133,8 +133,11 @@ class PeriodicLoads:
             raise InputError("the history is shorter than one period")
         last = history.time > start + 1e-6 * own.period
         marched = history[name][last]
+        half_range = 0.5 * float(np.ptp(marched))
+        if not half_range > 1e-12 * np.max(np.abs(history.coefficients)):
+            raise InputError(f"{name} does not move: a relative difference has no meaning")
         apart = self.at(own.omega * history.time[last])[:, column] - marched
-        return float(np.sqrt(np.mean(apart**2)) / (0.5 * np.ptp(marched)))
+        return float(np.sqrt(np.mean(apart**2))) / half_range
 
     def summary(self) -> str:
         """A few lines."""
