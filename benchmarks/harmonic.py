@@ -3,7 +3,7 @@
 AGARD R-702 (Landon 1982), pitch about c/4, inviscid here: compared with each other, not with the wind tunnel. The
 difference of two loops is the root mean square over the period relative to the marched loop's half-range. Costs are
 products with the Jacobian of one instant, the steady states from which both start not counted.
-``python benchmarks/harmonic.py PICTURE.png`` draws the loops as well.
+``python benchmarks/harmonic.py loops.png`` draws the loops as well.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from indicial.methods import forced_oscillation, reduced_frequency
 from indicial.methods.reduced_frequency import PeriodicLoads
 from indicial.motion import FlightCondition
 
-AROUND, NORMAL, FARFIELD = 128, 48, 50.0
+AROUND, NORMAL, FARFIELD = 96, 36, 50.0
 HARMONICS = (1, 2, 3, 5)
 PERIODS, STEPS = 3, 120
 
@@ -136,8 +136,9 @@ def picture(comparisons: list[Comparison], path: str) -> None:
 
 
 if __name__ == "__main__":
-    found = [Comparison.of(case) for case in CASES]
-    for item in found:
-        for figure in item.figures():
-            print(figure.line())
+    found = []
+    for case in CASES:
+        found.append(Comparison.of(case))
+        for figure in found[-1].figures():
+            print(figure.line(), flush=True)
     picture(found, sys.argv[1])

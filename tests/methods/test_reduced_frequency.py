@@ -195,7 +195,7 @@ def test_on_the_supersonic_plate_it_equals_exact_theory(k: float, motion: str) -
 
 
 def test_at_finite_amplitude_it_tends_with_h_to_what_the_march_tends_to_with_its_step() -> None:
-    """Five degrees about two at M 2: BDF2's error falls with the square of the step, so two marches tell their limit."""
+    """Five degrees at M 2: BDF2's error falls with the square of the step, so two marches tell their limit."""
     condition, amplitude, k = FlightCondition(2.0, alpha=np.radians(2.0)), np.radians(5.0), 0.3
     coarse, fine = (
         forced_oscillation.run(plate(16), condition, amplitude, k, periods=2, steps_per_period=n) for n in (32, 64)
