@@ -5,7 +5,7 @@ falls (switched evolution relaxation, Mulder & van Leer 1985) until the iteratio
 start goes through the first-order scheme, which nothing upsets, to the second-order one.
 
 On its way to its place a shock raises the residual, so a step may: only one that raises it threefold is taken back.
-(Asked never to raise it, by a line search, the iteration takes twice the steps to a transonic flow.)
+(Asked never to raise it, by a line search, the iteration takes up to three times the steps to a transonic flow.)
 """
 
 from __future__ import annotations
