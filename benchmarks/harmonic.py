@@ -3,7 +3,7 @@
 AGARD R-702 (Landon 1982), pitch about c/4, inviscid here: compared with each other, not with the wind tunnel. The
 difference of two loops is the root mean square over the period relative to the marched loop's half-range. Costs are
 products with the Jacobian of one instant, the steady states from which both start not counted.
-``python benchmarks/harmonic.py loops.png`` draws the loops as well.
+``python benchmarks/harmonic.py loops.png 64`` draws the loops as well, with so many cells round the section.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from indicial.methods import forced_oscillation, reduced_frequency
 from indicial.methods.reduced_frequency import PeriodicLoads
 from indicial.motion import FlightCondition
 
-AROUND, NORMAL, FARFIELD = 96, 36, 50.0
+AROUND, FARFIELD = 96, 50.0
 HARMONICS = (1, 2, 3, 5)
 PERIODS, STEPS = 3, 120
 
@@ -39,6 +39,7 @@ class Case:
     mean: float
     amplitude: float
     k: float
+    around: int = AROUND
 
     @property
     def condition(self) -> FlightCondition:
@@ -46,7 +47,8 @@ class Case:
 
     @cached_property
     def solver(self) -> FiniteVolumeSolver:
-        mesh = airfoil_mesh(Airfoil.naca("0012"), n_around=AROUND, n_normal=NORMAL, farfield=FARFIELD)
+        normal = 3 * self.around // 8
+        mesh = airfoil_mesh(Airfoil.naca("0012"), n_around=self.around, n_normal=normal, farfield=FARFIELD)
         return FiniteVolumeSolver(mesh, ReferenceQuantities(1.0, 1.0, (0.25, 0.0, 0.0)))
 
     def periodic(self, harmonics: int) -> PeriodicLoads:
@@ -93,12 +95,14 @@ class Comparison:
 
     def figures(self) -> list[Figure]:
         cost = self.marched.provenance["jacobian_products"]
-        periodicity = forced_oscillation.fourier(self.marched).periodicity
+        reading = forced_oscillation.fourier(self.marched, 1)
+        periodicity = reading.periodicity
         assert periodicity is not None
         figures = [
             Figure(f"{self.case.name}: march, {PERIODS} periods", cost, "products"),
             Figure(f"{self.case.name}: march, {PERIODS} periods", self.seconds[0], "s"),
-            Figure(f"{self.case.name}: march, change of cm from period to period", 100.0 * periodicity[4], "%"),
+            Figure(f"{self.case.name}: march, change of CN from period to period", 100.0 * periodicity[2], "%"),
+            Figure(f"{self.case.name}: march, change of Cm from period to period", 100.0 * periodicity[4], "%"),
         ]
         for h, loads in self.loads.items():
             name = f"{self.case.name}: h = {h}"
@@ -106,6 +110,8 @@ class Comparison:
                 figures.append(
                     Figure(f"{name}, {load} off the march", 100.0 * loads.difference(self.marched, load), "%")
                 )
+                damping = loads.reading().value(load) / reading.value(load) - 1.0
+                figures.append(Figure(f"{name}, {load} out of phase off the march", 100.0 * damping, "%"))
             figures.append(Figure(f"{name}", loads.provenance["jacobian_products"], "products"))
             figures.append(Figure(f"{name}", self.seconds[h], "s"))
         return figures
@@ -138,7 +144,7 @@ def picture(comparisons: list[Comparison], path: str) -> None:
 if __name__ == "__main__":
     found = []
     for case in CASES:
-        found.append(Comparison.of(case))
+        found.append(Comparison.of(replace(case, around=int(sys.argv[2]))))
         for figure in found[-1].figures():
             print(figure.line(), flush=True)
     picture(found, sys.argv[1])

@@ -95,6 +95,14 @@ def test_three_harmonics_hold_a_cubic_load_exactly() -> None:
     assert loads.distortion("CN") < 1e-9
 
 
+def test_a_second_harmonic_is_folded_onto_the_first_by_three_instants() -> None:
+    """``cos 2wt = cos wt`` at wt = 0, 120 and 240 degrees: what one harmonic cannot tell, two can."""
+    solver = PeriodicSystem(replace(random_system(REFERENCE), distortion=cubic))
+    one, two = (reduced_frequency.run(solver, CONDITION, A, K, "plunge", h) for h in (1, 2))
+    assert one.cosine[0, 4] - two.cosine[0, 4] == pytest.approx(-3.0 * A**2 / 2.0, rel=1e-2)
+    assert one.cosine[0, 2] == pytest.approx(two.cosine[0, 2], rel=1e-6)
+
+
 def test_the_series_runs_through_the_instants_and_its_history_is_read_by_every_reduction() -> None:
     solver = PeriodicSystem(replace(random_system(REFERENCE), distortion=cubic))
     oscillation = forced_oscillation.experiment(CONDITION, REFERENCE, A, K)
