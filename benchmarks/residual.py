@@ -1,14 +1,19 @@
 """Cost of one flow residual a cell, with one and two threads, against the memory it must move.
 
 Second order with limiter, moving mesh, 3-D. The limit is the time in which this machine copies the bytes that the
-residual cannot do without, each touched once: states, gradients, face geometry, face fluxes, tables.
+residual cannot do without, each touched once: states, gradients, face geometry, face fluxes, tables. Where OpenFOAM is
+installed and its environment set, one step of its density-based solver on the same moving mesh is timed too: an
+explicit step is one residual and little else, on both sides.
 """
 
 from __future__ import annotations
 
+import time
+
 import numba
 import numpy as np
 from figures import Figure, best_time
+from peers import openfoam
 
 from indicial.cfd.flow import STILL_AIR, Grid, Jacobian, MeshMotion, Residual
 from indicial.cfd.mesh import box_mesh
@@ -20,7 +25,8 @@ MOTION = MeshMotion(np.array([-2.0, 0.3, 0.5]), np.array([0.3, -0.5, 0.2]))
 
 def measure() -> list[Figure]:
     """Time residual and Jacobian product on a skewed box of 200,000 cells."""
-    grid = Grid.from_mesh(box_mesh(SHAPE, skew="smooth"), ReferenceQuantities(1.0, 1.0, (0.5, 0.5, 0.5)))
+    mesh = box_mesh(SHAPE, skew="smooth")
+    grid = Grid.from_mesh(mesh, ReferenceQuantities(1.0, 1.0, (0.5, 0.5, 0.5)))
     residual = Residual(grid)
     q = STILL_AIR * (1.0 + 0.01 * np.random.default_rng(1).standard_normal((grid.n_cells, 5)))
     jacobian = Jacobian(residual, q, MOTION)
@@ -42,14 +48,29 @@ def measure() -> list[Figure]:
     for name in ("residual", "Jacobian product"):
         if (name, 2) in times:
             figures.append(Figure(f"{name}, speed-up by a second thread", times[name, 1] / times[name, 2], ""))
-    figures.append(Figure("residual over a copy of what it must move", times["residual", 1] / _copy_time(residual), ""))
+    bytes_moved = _bytes_moved(residual)
+    figures.append(Figure("bytes the residual must move, each once", bytes_moved / grid.n_cells, "a cell"))
+    figures.append(Figure("residual over a copy of them", times["residual", 1] / _copy_time(bytes_moved), ""))
+    if openfoam.available():
+        numba.set_num_threads(1)
+        taken = best_time(lambda: residual(q, MOTION), 20, time.process_time)
+        step = openfoam.step_time(mesh)
+        figures.append(Figure("residual, processor time", 1e6 * taken / grid.n_cells, "microseconds a cell"))
+        figures.append(Figure(f"{openfoam.SOLVER}, one step", 1e6 * step / grid.n_cells, "microseconds a cell"))
+        ratio = step / taken
+        figures.append(Figure(f"{openfoam.SOLVER}, step over residual", ratio, "", "at least 5", ratio >= 5.0))
     return figures
 
 
-def _copy_time(residual: Residual) -> float:
-    """Time [s] to copy the bytes of the residual's arrays once, one thread."""
+def _bytes_moved(residual: Residual) -> int:
+    """Size of all that one evaluation reads or writes."""
     g = residual.grid
-    arrays = [residual.gradient, residual.face_flux, *(v for v in vars(g).values() if isinstance(v, np.ndarray))]
-    count = sum(a.nbytes for a in arrays) // 8
-    source, target = np.ones(count), np.empty(count)
+    states = 2 * 5 * 8 * g.n_cells
+    tables = (g.blocks, g.owner, g.neighbour, g.offsets, g.faces, g.signs, g.cells, g.weights, g.volume)
+    return states + sum(a.nbytes for a in (residual.gradient, residual.face_flux, *tables))
+
+
+def _copy_time(size: int) -> float:
+    """Time [s] to copy as many bytes, one thread."""
+    source, target = np.ones(size // 8), np.empty(size // 8)
     return best_time(lambda: np.copyto(target, source))

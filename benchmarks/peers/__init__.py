@@ -1,0 +1,1 @@
+"""Other programs, measured on the same work where they are installed."""
