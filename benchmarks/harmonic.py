@@ -136,9 +136,11 @@ def picture(comparisons: list[Comparison], path: str) -> None:
             ax.plot(alpha, one.marched[name][last], color="0.6", lw=3.0, label="march")
             for loads in one.loads.values():
                 loads.plot(name, ax)
+            if ax is not axes[0, 0]:
+                ax.get_legend().remove()
             ax.set_title(f"{one.case.name}, M {one.case.mach:g}, mean {one.case.mean:g} deg" if row == 0 else "")
     figure.tight_layout()
-    figure.savefig(path, dpi=120)
+    figure.savefig(path, dpi=75)
 
 
 if __name__ == "__main__":
