@@ -72,21 +72,6 @@ def test_gradients_of_linear_fields_are_exact_on_a_skewed_mesh(skewed: Mesh) -> 
     assert np.max(np.abs(out - slope)) < 1e-11
 
 
-@pytest.mark.parametrize("kinds", ["farfield", ALL_KINDS], ids=["farfield", "all kinds"])
-@pytest.mark.parametrize("second_order", [True, False])
-def test_the_jacobian_is_the_slope_of_the_residual(kinds: object, second_order: bool) -> None:
-    """Central differences of a smooth function fall off with h^2; at 1e-6 round-off and h^2 are both below 1e-8."""
-    mesh = box_mesh((5, 4, 5), skew="random", kinds=kinds)  # type: ignore[arg-type]
-    grid = Grid.from_mesh(mesh, REFERENCE)
-    residual = Residual(grid, second_order=second_order)
-    q = disturbed_air(grid, 0.1)
-    x = np.random.default_rng(3).standard_normal(q.shape)
-    exact = Jacobian(residual, q, MOTION).apply(x)
-    h = 1e-6
-    slope = (residual(q + h * x, MOTION) - residual(q - h * x, MOTION)) / (2.0 * h)
-    assert np.max(np.abs(slope - exact)) < 1e-8 * np.max(np.abs(exact))
-
-
 def test_the_compact_blocks_are_the_first_order_jacobian_and_ilu_solves_a_downstream_chain_exactly() -> None:
     """On one row of cells ILU(0) has no fill to drop, so it is a direct solver (to its single precision)."""
     mesh = box_mesh((12, 1, 1), skew="none", kinds=ALL_KINDS)  # type: ignore[arg-type]
