@@ -8,14 +8,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from indicial.cfd import ConvergenceHistory
 from indicial.conventions import Array, ReferenceQuantities
 from indicial.errors import DivergenceError
+from indicial.frequency import FrequencyResponse
 from indicial.history import History
 from indicial.motion import FlightCondition, Motion, Rates
 from indicial.solver import Solver, SteadyLoads
+from rom.linearised import DenseFlow
 from theory.linear import LinearSystem
+
+_COLUMNS = ("alpha", "beta", "p", "q", "r")
 
 
 def missile(reference: ReferenceQuantities) -> LinearSystem:
@@ -33,6 +38,28 @@ def missile(reference: ReferenceQuantities) -> LinearSystem:
     d = (1.0 - lagging.sum()) * settled
     offset = np.array([0.35, 0.0, 0.0, 0.0, 0.0, 0.0])
     return LinearSystem(reference, np.repeat(poles, 5), b, c, d, offset)
+
+
+class _Flow(DenseFlow):
+    @property
+    def baseline(self) -> Array:
+        return missile(self.reference).offset
+
+
+def longitudinal_flow(system: LinearSystem, condition: FlightCondition) -> DenseFlow:
+    """What alpha and q do to CA, CN and Cm."""
+    columns, rows = [_COLUMNS.index(name) for name in ("alpha", "q")], [0, 2, 4]
+    moved = np.flatnonzero(np.any(system.b[:, columns] != 0.0, axis=1))
+    return _Flow(
+        mass=np.eye(moved.size),
+        jacobian=np.diag(-system.poles[moved]),
+        b=-system.b[np.ix_(moved, columns)],
+        c=system.c[np.ix_(rows, moved)],
+        d=system.d[np.ix_(rows, columns)],
+        outputs=("CA", "CN", "Cm"),
+        condition=condition,
+        reference=system.reference,
+    )
 
 
 @dataclass(frozen=True)
@@ -69,6 +96,28 @@ class _Logged:
     def unsteady(self, condition: FlightCondition, motion: Motion, times: Array) -> History:
         self._note(str(motion.describe()["kind"]))
         return self.solver.unsteady(condition, motion, times)
+
+    def frequency_response(
+        self, condition: FlightCondition, k: ArrayLike = (), inputs: tuple[str, ...] | None = None
+    ) -> FrequencyResponse:
+        self._note("frequency_response")
+        system, wanted, ks = self.solver, inputs or _COLUMNS, np.atleast_1d(np.asarray(k, dtype=float))
+        columns = [_COLUMNS.index(name) for name in wanted]
+        return FrequencyResponse(
+            k=ks,
+            inputs=wanted,
+            values=np.array([system.transfer(one)[:, columns] for one in ks]),
+            static=system.transfer(0.0).real[:, columns],
+            slope=system.slope()[:, columns],
+            direct=system.d[:, columns],
+            baseline=system.offset,
+            condition=condition,
+            reference=system.reference,
+        )
+
+    def linearise(self, condition: FlightCondition) -> tuple[DenseFlow, ...]:
+        self._note("projection")
+        return (longitudinal_flow(self.solver, condition),)
 
     def convergence(self, condition: FlightCondition, rates: Rates = Rates()) -> ConvergenceHistory:
         return ConvergenceHistory(

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from indicial.conventions import ReferenceQuantities
-from indicial.errors import DivergenceError
+from indicial.errors import DivergenceError, InputError
 from indicial.motion import AlphaStep, FlightCondition, Rates
-from indicial.pipeline.experiments import ExperimentPool
-from indicial.solver import Solver
+from indicial.pipeline.experiments import FrequencyExperiment, ProjectionExperiment
+from indicial.pipeline.pool import ExperimentPool
+from indicial.solver import FrequencySolver, Solver
 from pipeline.oracle import Oracle, missile
 
 REFERENCE = ReferenceQuantities(0.03, math.pi * 0.03**2 / 4, (0.165, 0.0, 0.0))
@@ -38,6 +39,43 @@ def test_results_are_those_of_the_solver_itself_and_are_not_computed_twice(tmp_p
         again = pool.unsteady(CONDITION, step, TIMES)
     assert np.array_equal(again.coefficients, history.coefficients)
     assert len((tmp_path / "log").read_text().splitlines()) == 2
+
+
+def test_frequency_responses_are_kept_and_lateral_ones_take_half_a_body(tmp_path):
+    factory, exact = Oracle(REFERENCE, tmp_path / "log"), missile(REFERENCE)
+    with ExperimentPool(factory, REFERENCE, tmp_path / "kept", 1) as pool:
+        assert isinstance(pool, FrequencySolver)
+        response = pool.frequency_response(CONDITION, [0.0, 0.3], ("alpha", "p"))
+        assert np.array_equal(response.channel("Cl", "p"), [exact.transfer(k)[3, 2] for k in (0.0, 0.3)])
+    with ExperimentPool(factory, REFERENCE, tmp_path / "kept", 1) as pool:
+        again = pool.frequency_response(CONDITION, [0.0, 0.3], ("alpha", "p"))
+        other = pool.frequency_response(CONDITION, [0.0, 0.4], ("alpha", "p"))
+    assert np.array_equal(again.values, response.values)
+    assert other.k[1] == 0.4
+    assert (tmp_path / "log").read_text().splitlines() == 2 * ["frequency_response half"]
+
+
+def test_a_projected_model_is_kept_with_what_is_told_of_it(tmp_path):
+    factory = Oracle(REFERENCE, tmp_path / "log")
+    kept = []
+    for _ in range(2):
+        with ExperimentPool(factory, REFERENCE, tmp_path / "kept", 1) as pool:
+            kept.append(pool.projection(CONDITION, 0.5, 1e-3))
+    first, again = kept
+    assert np.array_equal(first.model.a, again.model.a)
+    assert first.facts == again.facts
+    assert first.facts["met"]
+    exact = missile(REFERENCE).transfer(0.3)[np.ix_([0, 2, 4], [0, 3])]
+    assert np.max(np.abs(first.model.frequency_response(0.3)[0] - exact)) < 1e-3 * np.max(np.abs(exact))
+    assert (tmp_path / "log").read_text().splitlines() == ["projection half"]
+
+
+def test_a_solver_that_cannot_be_linearised_says_so(tmp_path):
+    experiment = FrequencyExperiment(CONDITION, (0.1,), ("alpha",))
+    with pytest.raises(InputError, match="LinearSystem has no frequency response: it cannot be linearised"):
+        experiment.perform(missile(REFERENCE), tmp_path / "answer.nc")
+    with pytest.raises(InputError, match="LinearSystem cannot be linearised: no model can be projected"):
+        ProjectionExperiment(CONDITION, 0.5, 1e-3).perform(missile(REFERENCE), tmp_path / "answer.json")
 
 
 def test_another_time_axis_is_another_experiment(tmp_path):

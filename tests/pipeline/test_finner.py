@@ -45,6 +45,20 @@ def test_the_model_made_of_steps_predicts_the_damping_of_the_oscillation(results
     assert max(errors) < 0.01
 
 
+def test_the_operator_agrees_with_every_march_at_its_own_frequency(results):
+    """One linear flow, one mesh: they differ by amplitude, time step and tolerance alone, a tenth of the mesh's error."""
+    pairs = {(e["what"], e["name"]): abs(e["difference"]) for e in results["agreement"] if "operator" in e["what"]}
+    assert len(pairs) == 9
+    assert max(pairs.values()) < 5e-3
+
+
+def test_the_projected_model_repeats_the_oscillation_within_its_stated_error(results):
+    facts = results["operator"]["projection"]
+    assert facts["met"]
+    worst = [check["worst"] for check in results["rom"]["checks"] if check["model"] == "projected"]
+    assert max(worst) < facts["tolerance"]
+
+
 def test_every_method_shows_that_the_answer_is_linear(results):
     assert {entry["method"] for entry in results["linearity"]} == {"mrf", "fom", "irm"}
     assert max(abs(entry["change"]) for entry in results["linearity"]) < 0.01

@@ -10,8 +10,10 @@ import pytest
 from indicial.case import Case, parse_case
 from indicial.derivatives import DerivativeTable
 from indicial.errors import DivergenceError, InputError
+from indicial.frequency import FrequencyResponse
 from indicial.pipeline import ALL_STAGES, RunFolder, run_stages
 from indicial.reference_data import find_case
+from indicial.rom import StateSpaceModel
 from pipeline.oracle import Oracle, missile
 
 
@@ -71,6 +73,61 @@ def test_forced_oscillation_returns_the_transfer_function_at_k(results):
         assert fom.value(f"{load}_alphadot") == pytest.approx(np.imag(h[row, 0]) / k, rel=1e-3)
 
 
+def test_the_operator_gives_the_derivatives_at_zero_and_at_every_k(results):
+    system, columns = missile(quick_case().reference_quantities), {"alpha": 0, "q": 3, "p": 2}
+    table = DerivativeTable.from_records(results["derivatives"]).select(method="operator")
+    ks = sorted({*quick_case().operator.k, quick_case().forced_oscillation.k})
+    assert {record.k for record in table} == {None, *ks}
+    for k in (None, *ks):
+        at_k = table.select(k=k)
+        h = system.transfer(k or 0.0)
+        for load, motion in (("CN", "alpha"), ("Cm", "alpha"), ("CN", "q"), ("Cm", "q"), ("Cl", "p")):
+            row = ("CA", "CY", "CN", "Cl", "Cm", "Cn").index(load)
+            assert at_k.value(f"{load}_{motion}") == pytest.approx(h[row, columns[motion]].real, rel=1e-12)
+        lag = system.slope()[4, 0] if k is None else h[4, 0].imag / k
+        assert at_k.value("Cm_alphadot") == pytest.approx(lag, rel=1e-12)
+
+
+def test_the_other_methods_agree_with_the_operator(results):
+    pairs = [entry for entry in results["agreement"] if "operator" in entry["what"]]
+    assert len(pairs) == 9
+    for entry in pairs:
+        assert abs(entry["difference"]) < 1e-3, entry
+
+
+def test_the_projected_model_is_kept_and_repeats_steps_and_oscillations_it_was_not_made_of(run, results):
+    projected, fitted = (
+        StateSpaceModel.from_json(run.path / "rom" / f"{name}.json") for name in ("projected", "model")
+    )
+    facts = results["operator"]["projection"]
+    assert facts["met"]
+    assert facts["order"] == projected.order <= fitted.order
+    steps = {entry["model"]: entry for entry in results["rom"]["steps"]}
+    assert set(steps) == {"state space", "projected"}
+    # as good as its error over the band, relative to the peak: the unsteady part is half of these loads
+    assert max(channel["rms"] for channel in steps["projected"]["channels"]) < 3.0 * facts["tolerance"]
+    worst = [check["worst"] for check in results["rom"]["checks"] if check["model"] == "projected"]
+    assert len(worst) == 2
+    assert max(worst) < 0.01
+
+
+def test_the_frequency_response_is_kept_with_the_run(run):
+    response = FrequencyResponse.from_netcdf(run.path / "histories" / "frequency_response.nc")
+    assert response.inputs == ("alpha", "q", "p")
+    assert quick_case().forced_oscillation.k in response.k
+
+
+def test_without_a_band_no_model_is_projected(tmp_path):
+    case = quick_case()
+    case = case.model_copy(update={"operator": case.operator.model_copy(update={"k_max": 0.0})})
+    folder = RunFolder(tmp_path)
+    run_stages(case, folder, ("mesh", "fom", "irm", "operator", "rom"), make_factory=make_oracle)
+    assert folder.read("operator")["projection"] is None
+    assert [entry["model"] for entry in folder.read("rom")["steps"]] == ["state space"]
+    assert not (tmp_path / "rom" / "projected.json").exists()
+    assert "projection" not in (tmp_path / "log").read_text()
+
+
 def test_model_predicts_the_oscillations_it_has_not_seen(results):
     for check in results["rom"]["checks"]:
         if check["model"] != "deficiency, Eq. 16":
@@ -103,7 +160,7 @@ def test_records_hold_every_field_of_the_schema(results):
         assert record["rate_normalisation"] == "c/2V"
         assert record["moment_reference_m"] == pytest.approx([5.5 * 0.03, 0.0, 0.0])
     methods = {record["method"] for record in results["derivatives"]}
-    assert {"mrf", "fom", "irm", "rom", "identified", "measured"} <= methods
+    assert {"mrf", "fom", "irm", "operator", "rom", "identified", "measured"} <= methods
 
 
 def test_report_is_one_file_that_needs_nothing_else(run, results):

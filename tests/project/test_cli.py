@@ -46,7 +46,12 @@ def test_wrong_input_gives_one_line_and_exit_code_2(tmp_path):
         ("run",): "Missing argument 'CASE'",
         ("run", ""): "no case is named",
         ("run", "basic_finner_quick", "--worker", "2"): "No such option: --worker",
-        ("derive", "basic_finner_quick", "--method", "magic"): "'magic' is not one of 'mrf', 'fom', 'irm', 'all'",
+        (
+            "derive",
+            "basic_finner_quick",
+            "--method",
+            "magic",
+        ): "'magic' is not one of 'mrf', 'fom', 'irm', 'operator', 'all'",
         ("bogus",): "No such command 'bogus'",
     }
     for arguments, message in wrong.items():

@@ -39,6 +39,22 @@ def test_forced_oscillation_is_compared_by_its_fourier_reduction():
     assert rows["Cm_q+Cm_alphadot"].records["fom"].value == -270.0
 
 
+def test_the_operator_stands_beside_each_method_at_its_own_frequency():
+    """The oscillation's k as it is computed back from its angular frequency, not to the last digit."""
+    name = "Cm_q+Cm_alphadot"
+    of_operator = (
+        record(name, "operator", -280.0),
+        record(name, "operator", -271.0, k=0.1 * (1.0 + 1e-15)),
+        record(name, "operator", -250.0, k=0.5),
+    )
+    table = DerivativeTable((*TABLE, *of_operator))
+    row = {row.name: row for row in comparison(table)}[name]
+    assert row.records["operator"].value == -280.0
+    assert row.records["operator_at_k"].value == -271.0
+    assert "operator_at_k" not in {row.name: row for row in comparison(TABLE)}[name].records
+    assert "operator -22%" in statement([row], "it")
+
+
 def test_statement_is_made_from_the_numbers():
     said = statement(comparison(TABLE), "a mesh of 10 cells")
     assert "On a mesh of 10 cells" in said

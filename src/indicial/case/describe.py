@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Literal, get_args, get_origin
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen, MultipleOf
 from pydantic import BaseModel
@@ -36,14 +36,30 @@ def allowed(key: str, field: FieldInfo) -> str:
     """Type, unit and bounds of a key in words."""
     if _section(field):
         return f"a table [{key}] with {', '.join(_keys(field))}"
-    kind = field.annotation
+    kind, bounds = field.annotation, field.metadata
+    if get_origin(kind) is list:
+        (item,) = get_args(kind)
+        return f"a list, each {_value(key, *_unpacked(item))}"
+    return _value(key, kind, bounds)
+
+
+def _unpacked(kind: Any) -> tuple[Any, list[Any]]:
+    """The type and the bounds of an annotated type."""
+    if get_origin(kind) is not Annotated:
+        return kind, []
+    inner, *notes = get_args(kind)
+    return inner, [bound for note in notes for bound in getattr(note, "metadata", [note])]
+
+
+def _value(key: str, kind: Any, bounds: list[Any]) -> str:
     if get_origin(kind) is Literal:
         return " or ".join(repr(option) for option in get_args(kind))
-    unit = next((unit for end, unit in sorted(UNITS.items(), key=lambda u: -len(u[0])) if key.endswith(f"_{end}")), "")
+    ends = sorted(UNITS.items(), key=lambda u: -len(u[0]))
+    unit = next((unit for end, unit in ends if f"_{key}".endswith(f"_{end}")), "")
     words = [_TYPES.get(kind, str(kind)) if isinstance(kind, type) else str(kind)]
     if unit:
         words.append(f"in {unit}")
-    return " ".join([*words, " and ".join(_bounds(field.metadata))]).strip()
+    return " ".join([*words, " and ".join(_bounds(bounds))]).strip()
 
 
 def case_reference() -> str:

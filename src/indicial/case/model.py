@@ -26,13 +26,16 @@ UNITS = {
     "calibres": "calibres",
     "s": "seconds",
     "deg_s": "degrees per second",
+    "k": "omega c/2V",
+    "k_max": "omega c/2V",
 }
-"""Unit of a quantity by the end of its key."""
+"""Unit of a quantity by its key or the end of it."""
 
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 SmallAngle = Annotated[float, Field(gt=0.0, le=5.0)]
 SmallRate = Annotated[float, Field(gt=0.0, le=0.05)]
+Frequency = Annotated[float, Field(ge=0.0, le=20.0)]
 
 
 class Section(BaseModel):
@@ -138,7 +141,7 @@ class MovingFrame(Section):
 class ForcedOscillation(Section):
     """Forced oscillation (FOM): pitching about the moment reference, and plunging."""
 
-    k: Annotated[float, Field(gt=0.0, le=2.0, description="reduced frequency omega c/2V")] = 0.1
+    k: Annotated[float, Field(gt=0.0, le=2.0, description="reduced frequency")] = 0.1
     amplitude_deg: Annotated[SmallAngle, Field(description="amplitude in alpha")] = 0.25
     second_factor: Annotated[
         float,
@@ -170,6 +173,36 @@ class IndicialResponse(Section):
     def _ordered(self) -> Self:
         if not self.first_step <= self.last_step < self.duration:
             raise ValueError("last_step: is out of order; allowed: first_step <= last_step < duration")
+        return self
+
+
+class Operator(Section):
+    """The flow linearised about its steady state: derivatives and H(ik) by linear solves, without a march."""
+
+    k: Annotated[
+        list[Frequency],
+        Field(description="reduced frequencies of H(ik), beside 0 and that of the forced oscillation"),
+    ] = [0.05, 0.2, 0.5]
+    inputs: Annotated[
+        list[Literal["alpha", "q", "beta", "p", "r"]],
+        Field(
+            description="motions that loads respond to; alpha and q must be there, half the body serves the others too"
+        ),
+    ] = ["alpha", "q"]
+    k_max: Annotated[
+        Frequency, Field(description="band, from 0, of the model projected from the operator; 0 makes none")
+    ] = 0.5
+    tolerance: Annotated[
+        float,
+        Field(ge=1e-6, le=0.1, description="error of that model over the band, relative to the peak of each channel"),
+    ] = 0.01
+
+    @model_validator(mode="after")
+    def _longitudinal(self) -> Self:
+        if not {"alpha", "q"} <= set(self.inputs):
+            raise ValueError("inputs: lacks alpha or q, which other methods are compared with; allowed: both, and more")
+        if len(set(self.inputs)) < len(self.inputs):
+            raise ValueError("inputs: holds one twice; allowed: each once")
         return self
 
 
@@ -247,6 +280,7 @@ class Case(Section):
     moving_frame: Annotated[MovingFrame, Field(description="moving reference frame, MRF")] = MovingFrame()
     forced_oscillation: Annotated[ForcedOscillation, Field(description="forced oscillation, FOM")] = ForcedOscillation()
     indicial_response: Annotated[IndicialResponse, Field(description="indicial response, IRM")] = IndicialResponse()
+    operator: Annotated[Operator, Field(description="linearised flow")] = Operator()
     rom: Annotated[Rom, Field(description="reduced-order model")] = Rom()
     vehicle: Annotated[Vehicle, Field(description="mass properties")]
     flight: Annotated[Flight, Field(description="free flight")] = Flight()

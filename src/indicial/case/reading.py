@@ -46,7 +46,8 @@ def parse_case(text: str, name: str = "case") -> Case:
 
 
 def _say(problem: dict[str, Any]) -> str:
-    location = tuple(str(part) for part in problem["loc"])
+    # an entry of a list is described by the list
+    location = tuple(part for part in problem["loc"] if isinstance(part, str))
     key = ".".join(location)
     kind = problem["type"]
     if kind == "extra_forbidden":

@@ -39,6 +39,7 @@ class Method(enum.StrEnum):
     MRF = "mrf"
     FOM = "fom"
     IRM = "irm"
+    OPERATOR = "operator"
     ALL = "all"
 
 
@@ -81,7 +82,7 @@ def _perform(
     "`indicial run my_missile.toml --output runs/second --workers 8`"
 )
 def run(case: Target, output: Output = None, workers: Workers = None, verbose: Verbose = False) -> None:
-    """Do everything: mesh, CFD by three methods, reduced-order model, flights, identification, comparison, report.
+    """Do everything: mesh, CFD by four methods, reduced-order model, flights, identification, comparison, report.
 
     An interrupted run goes on where it was when the same command is given again.
     """
@@ -107,11 +108,12 @@ def derive(
     workers: Workers = None,
     verbose: Verbose = False,
 ) -> None:
-    """Dynamic derivatives from CFD: moving frame (mrf), forced oscillation (fom), indicial response (irm).
+    """Dynamic derivatives from CFD: moving frame (mrf), forced oscillation (fom), indicial response (irm), linearised
+    flow (operator).
 
     CFD results that are already in the run folder are used again.
     """
-    stages = ("mrf", "fom", "irm") if method is Method.ALL else (method.value,)
+    stages = tuple(one.value for one in Method if one is not Method.ALL) if method is Method.ALL else (method.value,)
     _perform(case, output, workers, verbose, ("mesh", *stages), resume=True)
 
 

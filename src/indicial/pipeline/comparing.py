@@ -12,9 +12,9 @@ from indicial.derivatives import SCHEMA_VERSION, DerivativeTable
 from indicial.files import write_text
 from indicial.pipeline.context import Context, Outcome
 from indicial.reference_data import finner_range_at
-from indicial.report.comparison import comparison, comparison_text, statement
+from indicial.report.comparison import comparison, comparison_text, operator_at, statement
 
-COMPUTED = ("mrf", "fom", "irm", "rom", "identify")
+COMPUTED = ("mrf", "fom", "irm", "operator", "rom", "identify")
 SECTIONS = ("mesh", *COMPUTED, "fly")
 
 
@@ -39,6 +39,7 @@ def compare(context: Context) -> Outcome:
         "timings_s": {stage: record["seconds"] for stage, record in records.items()},
         "linearity": [entry for method in ("mrf", "fom", "irm") for entry in records[method]["linearity"]],
         "agreement": agreement,
+        "operator": _plain(records["operator"]),
         "rom": _plain(records["rom"]),
         "flight": _plain(records["fly"]),
         "identification": _plain(records["identify"]),
@@ -83,6 +84,10 @@ def _agreement(table: DerivativeTable, records: dict[str, Any]) -> list[dict[str
 
     mrf, irm = table.select(method="mrf"), table.select(method="irm")
     fom = table.select(method="fom", reduction="fourier")
+    operator = table.select(method="operator", k=None)
+    oscillation = fom.records[0].k
+    assert oscillation is not None
+    operator_at_k = operator_at(table, oscillation)
     for load in ("CN", "Cm"):
         total = f"{load}_q+{load}_alphadot"
         size = fom.value(total)
@@ -90,14 +95,22 @@ def _agreement(table: DerivativeTable, records: dict[str, Any]) -> list[dict[str
         ends = records["irm"]["ends"]
         pair("end of the step in alpha, MRF", alpha, ends["alpha"][load], mrf.value(alpha), mrf.value(alpha))
         pair("end of the step in q, MRF", f"{load}_q", ends["q"][load], mrf.value(f"{load}_q"), size)
+        pair("slope: MRF, operator", alpha, mrf.value(alpha), operator.value(alpha), mrf.value(alpha))
+        pair("rate: MRF, operator", f"{load}_q", mrf.value(f"{load}_q"), operator.value(f"{load}_q"), size)
         if f"{load}_alphadot" in irm.names():
             lag = irm.value(f"{load}_alphadot")
+            if f"{load}_alphadot" in operator.names():
+                pair("lag: IRM, operator", f"{load}_alphadot", lag, operator.value(f"{load}_alphadot"), size)
             pair("lag: FOM at k, IRM at k = 0", f"{load}_alphadot", fom.value(f"{load}_alphadot"), lag, size)
             pair("sum: FOM at k, MRF + IRM at k = 0", total, size, mrf.value(f"{load}_q") + lag, size)
+        pair("sum at the same k: FOM, operator", total, size, operator_at_k.value(total), size)
         at_k = records["rom"]["out_of_phase_at_k"][load]
         pair("sum at the same k: FOM, reduced-order model", total, at_k["fom"], at_k["rom"], size)
         by_reduction = [r.value for r in table.select(method="fom", name=total)]
         pair("reductions of FOM: largest, smallest", total, max(by_reduction), min(by_reduction), size)
+    if "Cl_p" in operator.names():
+        whole, half = mrf.value("Cl_p"), operator.value("Cl_p")
+        pair("roll: MRF (whole body), operator (half)", "Cl_p", whole, half, whole)
     return found
 
 

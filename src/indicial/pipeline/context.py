@@ -8,8 +8,8 @@ from typing import Any
 
 from indicial.case import Case
 from indicial.derivatives import DerivativeTable
-from indicial.pipeline.experiments import SolverFactory
 from indicial.pipeline.folder import RunFolder
+from indicial.pipeline.pool import SolverFactory
 from indicial.pipeline.progress import Reporter
 
 FactoryMaker = Callable[[Case, RunFolder], SolverFactory]

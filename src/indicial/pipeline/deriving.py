@@ -1,4 +1,4 @@
-"""The derive stages: the three methods, side by side on one pool of CFD experiments."""
+"""The derive stages: the methods, side by side on one pool of CFD experiments."""
 
 from __future__ import annotations
 
@@ -11,18 +11,22 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 from indicial.conventions import COEFFICIENTS
 from indicial.derivatives import Derivative, DerivativeTable
 from indicial.history import History
-from indicial.methods import forced_oscillation, indicial_response, moving_frame
+from indicial.methods import forced_oscillation, indicial_response, moving_frame, operator
 from indicial.motion import FlightCondition, Rates
 from indicial.pipeline.context import Context, Outcome
-from indicial.pipeline.experiments import ExperimentPool
+from indicial.pipeline.pool import ExperimentPool
 from indicial.pipeline.progress import Tally
 from indicial.report.space import FlowPicture
 from indicial.solver import SteadyLoads
 
-METHODS = ("mrf", "fom", "irm")
+METHODS = ("mrf", "operator", "fom", "irm")
 
 # Cost of a steady state in time steps of an unsteady run, for the progress bar.
 _STEADY_COST = 25.0
+
+# Cost of one solution of the linearised flow, likewise, and how many a projected model takes.
+_SOLVE_COST = 1.0
+_PROJECTION_SOLVES = 30
 
 T = TypeVar("T")
 
@@ -42,7 +46,12 @@ def derive(context: Context, methods: Iterable[str]) -> dict[str, Outcome]:
     case = context.case
     tally = Tally(context.reporter, _expected(context, wanted), _weights(context))
     factory = context.make_factory(case, context.folder)
-    performers = {"mrf": _moving_frame, "fom": _forced_oscillation, "irm": _indicial_response}
+    performers = {
+        "mrf": _moving_frame,
+        "fom": _forced_oscillation,
+        "irm": _indicial_response,
+        "operator": _linearised_flow,
+    }
     # The pool is closed first: on an error it ends its workers, and with them what the threads wait for.
     with (
         ThreadPoolExecutor(32) as threads,
@@ -64,11 +73,12 @@ def derive(context: Context, methods: Iterable[str]) -> dict[str, Outcome]:
 
 def _expected(context: Context, methods: tuple[str, ...]) -> float:
     steps = _weights(context)
-    steady = {"mrf": 11, "fom": 1, "irm": 5}
+    steady = {"mrf": 11, "fom": 1, "irm": 5, "operator": 1}
     unsteady = {
         "mrf": 0.0,
         "fom": 2.0 * steps["pitch oscillation"] + steps["plunge oscillation"],
         "irm": 2.0 * steps["alpha step"] + 2.0 * steps["pitch rate step"],
+        "operator": steps["frequency response"] + (steps["projection"] if context.case.operator.k_max else 0.0),
     }
     return sum(_STEADY_COST * steady[m] + unsteady[m] for m in methods)
 
@@ -84,6 +94,8 @@ def _weights(context: Context) -> dict[str, float]:
         "alpha step": step,
         "pitch rate step": step,
         "steady": _STEADY_COST,
+        "frequency response": _SOLVE_COST * len(context.case.operator.inputs) * (2 + len(_frequencies(context))),
+        "projection": _SOLVE_COST * _PROJECTION_SOLVES,
     }
 
 
@@ -260,6 +272,34 @@ def _indicial_response(context: Context, pool: ExperimentPool, threads: ThreadPo
             "tails": tails,
         },
         _values(table, ("CN_alpha", "Cm_alphadot", "Cm_q")) + "".join(f", {name} refused" for name in result.refused),
+    )
+
+
+def _frequencies(context: Context) -> list[float]:
+    """Those of the case, and the forced oscillation's, where the two methods must agree."""
+    return sorted({*context.case.operator.k, context.case.forced_oscillation.k})
+
+
+def _linearised_flow(context: Context, pool: ExperimentPool, threads: ThreadPoolExecutor) -> Outcome:
+    case, settings = context.case, context.case.operator
+    condition, k = case.flight_condition, _frequencies(context)
+    answer = threads.submit(operator.run, pool, condition, k, tuple(settings.inputs))
+    projected = None
+    if settings.k_max > 0.0:
+        projected = threads.submit(pool.projection, condition, settings.k_max, settings.tolerance).result()
+        projected.model.to_json(context.folder.projected_model)
+    response = answer.result()
+    response.to_netcdf(context.folder.frequency_response)
+    table = operator.derivatives(response)
+    return Outcome(
+        {
+            "derivatives": table.to_records(),
+            "k": k,
+            "refused": operator.refusals(response),
+            "provenance": response.provenance,
+            "projection": None if projected is None else {"order": projected.model.order, **projected.facts},
+        },
+        _values(table.select(k=None), ("CN_alpha", "Cm_alphadot", "Cm_q", "Cl_p")),
     )
 
 

@@ -1,64 +1,32 @@
-r"""CFD experiments in worker processes, each kept in a file of its own.
+"""What can be asked of a solver: a steady state, a history under a motion, a frequency response, a projected model.
 
-`ExperimentPool` is a solver: the methods run on it as on any other. What they ask for (a steady state, a history under
-a motion) is looked up among the kept results, and computed by a worker process only if it is not there. That is how
-a run resumes, how its experiments share the cores, and how two methods share one result.
+Each kind says what its result depends on, what it is called, and how a worker process performs it into a file.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import logging
 import math
-import multiprocessing
-import os
 import re
-import threading
-import time
-from collections.abc import Callable
-from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Protocol, Self, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from indicial import __version__
-from indicial.conventions import Array, ReferenceQuantities
-from indicial.errors import DivergenceError, IndicialError
+from indicial.conventions import Array
+from indicial.errors import InputError
 from indicial.files import write_text
-from indicial.history import History
 from indicial.motion import FlightCondition, Motion, Rates, SteadyMotion
-from indicial.solver import Solver, SteadyLoads
+from indicial.rom import Projection, StateSpaceModel, project
+from indicial.solver import FrequencySolver, LinearisedFlow, Solver
 
 if TYPE_CHECKING:
     from indicial.cfd import ConvergenceHistory
-
-log = logging.getLogger(__name__)
-
-_ABANDONED = 3600.0  # age of a half-written file that nobody is writing any more [s]
-
-Fraction = Callable[[float], None]
-"""Told the fraction of one experiment that is done, 0 to 1."""
-
-Watch = Callable[[str, float], None]
-"""Told an experiment's label and the fraction of it that is done."""
-
-
-class SolverFactory(Protocol):
-    """Builds solvers in a worker process; must be picklable."""
-
-    def key(self) -> str:
-        """What a result depends on beside the motion: mesh, reference, settings."""
-        ...
-
-    def build(self, whole: bool, progress: Fraction) -> Solver:
-        """A solver on the whole model, or on the half whose mirror image is the rest."""
-        ...
 
 
 @runtime_checkable
@@ -70,43 +38,222 @@ class TellsConvergence(Protocol):
         ...
 
 
+@runtime_checkable
+class Linearises(Protocol):
+    """A solver that can be linearised about a steady state."""
+
+    def linearise(self, condition: FlightCondition) -> tuple[LinearisedFlow, ...]:
+        """One flow, or several that share the inputs among them."""
+        ...
+
+
+class Experiment(ABC):
+    """One thing to ask a solver."""
+
+    suffix: ClassVar[str]
+
+    @property
+    @abstractmethod
+    def label(self) -> str:
+        """What it is, for progress, errors and the file's name."""
+
+    @property
+    @abstractmethod
+    def whole(self) -> bool:
+        """Whether it takes the whole model; else the half will do, whose mirror image is the rest."""
+
+    @abstractmethod
+    def depends_on(self) -> Iterator[Any]:
+        """All that its result depends on beside the solver: plain values, and bytes of arrays."""
+
+    @abstractmethod
+    def perform(self, solver: Solver, path: Path) -> None:
+        """Ask, and write the answer in one step."""
+
+    def key(self, factory_key: str) -> str:
+        """Another one for every other result."""
+        parts = (__version__, factory_key, type(self).__name__, *self.depends_on())
+        return hashlib.sha256(repr(parts).encode()).hexdigest()
+
+    def file_name(self, key: str) -> str:
+        """Name of its result file: what it is, and the start of its key."""
+        slug = re.sub(r"[^a-z0-9.+-]+", "_", self.label.lower()).strip("_")
+        return f"{slug}-{key[:8]}.{self.suffix}"
+
+
 @dataclass(frozen=True)
-class Experiment:
-    """One thing to ask a solver: a steady state (no `times`), or the loads at `times` under a motion."""
+class SteadyExperiment(Experiment):
+    """Loads of a steady state, and how it converged; JSON."""
+
+    condition: FlightCondition
+    rates: Rates
+    suffix = "json"
+
+    @property
+    def label(self) -> str:
+        """Angle of attack and rates."""
+        return _label(self.condition, SteadyMotion(self.condition, self.rates), steady=True)
+
+    @property
+    def whole(self) -> bool:
+        """Roll, yaw and sideslip take the whole model."""
+        return any(rate != 0.0 for rate in (self.condition.beta, self.rates.p, self.rates.r))
+
+    def depends_on(self) -> Iterator[Any]:
+        """Condition and rates."""
+        yield from (asdict(self.condition), self.rates.as_array().tobytes())
+
+    def perform(self, solver: Solver, path: Path) -> None:
+        """Solve for the state."""
+        loads = solver.steady(self.condition, self.rates)
+        content: dict[str, Any] = {
+            "experiment": self.label,
+            "coefficients": loads.coefficients.tolist(),
+            "convergence": loads.convergence,
+        }
+        if isinstance(solver, TellsConvergence):
+            history = solver.convergence(self.condition, self.rates)
+            content["history"] = {name: values.tolist() for name, values in history.to_arrays().items()}
+        write_text(path, json.dumps(content, indent=1))
+
+
+@dataclass(frozen=True)
+class UnsteadyExperiment(Experiment):
+    """Loads at `times` [s] under a motion; netCDF."""
 
     condition: FlightCondition
     motion: Motion
-    times: Array | None
-    whole: bool
-    label: str
-    key: str
+    times: Array
+    suffix = "nc"
 
     @property
-    def file_name(self) -> str:
-        """Name of its result file: what it is, and the start of its key."""
-        slug = re.sub(r"[^a-z0-9.+-]+", "_", self.label.lower()).strip("_")
-        return f"{slug}-{self.key[:8]}.{'json' if self.times is None else 'nc'}"
+    def label(self) -> str:
+        """The motion and its size."""
+        return _label(self.condition, self.motion, steady=False)
+
+    @property
+    def whole(self) -> bool:
+        """Roll, yaw and sideslip take the whole model."""
+        velocity, rate, velocity_before, rate_before = self._moves()
+        lateral = (velocity[:, 1], rate[:, 0], rate[:, 2], velocity_before[1:2], rate_before[[0, 2]])
+        return any(bool(np.any(component != 0.0)) for component in lateral)
+
+    def depends_on(self) -> Iterator[Any]:
+        """Condition, instants, and the motion at them."""
+        yield asdict(self.condition)
+        yield from (np.ascontiguousarray(array).tobytes() for array in (self.times, *self._moves()))
+
+    def perform(self, solver: Solver, path: Path) -> None:
+        """March."""
+        solver.unsteady(self.condition, self.motion, self.times).to_netcdf(path)
+
+    def _moves(self) -> tuple[Array, Array, Array, Array]:
+        motion = self.motion
+        return motion.velocity(self.times), motion.rate(self.times), motion.velocity_before, motion.rate_before
 
 
-def describe_experiment(
-    factory_key: str, condition: FlightCondition, motion: Motion, times: Array | None
-) -> Experiment:
-    """The experiment with its label and key; steady if `times` is None."""
-    instants = np.zeros(1) if times is None else times
-    velocity, rate = motion.velocity(instants), motion.rate(instants)
-    moves = (velocity, rate, motion.velocity_before, motion.rate_before)
-    lateral = [velocity[:, 1], rate[:, 0], rate[:, 2], motion.velocity_before[1:2], motion.rate_before[[0, 2]]]
-    digest = hashlib.sha256(repr((__version__, factory_key, times is None, asdict(condition))).encode())
-    for array in (instants, *moves):
-        digest.update(np.ascontiguousarray(array).tobytes())
-    return Experiment(
-        condition=condition,
-        motion=motion,
-        times=times,
-        whole=any(bool(np.any(component != 0.0)) for component in lateral),
-        label=_label(condition, motion, times is None),
-        key=digest.hexdigest(),
-    )
+@dataclass(frozen=True)
+class FrequencyExperiment(Experiment):
+    """H(ik) of the flow linearised about a steady state; netCDF."""
+
+    condition: FlightCondition
+    k: tuple[float, ...]
+    inputs: tuple[str, ...] | None
+    suffix = "nc"
+
+    @property
+    def label(self) -> str:
+        """Inputs and number of frequencies."""
+        return f"frequency response to {', '.join(self.inputs or ('all inputs',))} at {len(self.k)} k"
+
+    @property
+    def whole(self) -> bool:
+        """The half answers to lateral inputs too; about a state with sideslip there is no half."""
+        return self.condition.beta != 0.0
+
+    def depends_on(self) -> Iterator[Any]:
+        """Condition, frequencies and inputs."""
+        yield from (asdict(self.condition), self.k, self.inputs)
+
+    def perform(self, solver: Solver, path: Path) -> None:
+        """Solve for the response."""
+        if not isinstance(solver, FrequencySolver):
+            raise InputError(f"{type(solver).__name__} has no frequency response: it cannot be linearised")
+        solver.frequency_response(self.condition, self.k, self.inputs).to_netcdf(path)
+
+
+@dataclass(frozen=True)
+class KeptProjection:
+    """A projected model, and what is told of it.
+
+    Parameters
+    ----------
+    model : StateSpaceModel
+    facts : dict
+        Band, errors, solutions taken: plain values, see `indicial.rom.Projection`.
+    """
+
+    model: StateSpaceModel
+    facts: dict[str, Any]
+
+    @classmethod
+    def of(cls, projection: Projection) -> Self:
+        """What is kept of a projection."""
+        p = projection
+        facts = {
+            "k_max": p.k_max,
+            "tolerance": p.tolerance,
+            "met": p.met,
+            "estimated_error": p.estimated_error,
+            "validated_error": p.validated_error,
+            "held_out": [asdict(point) for point in p.held_out],
+            "points": p.points.tolist(),
+            "forward_solves": p.forward_solves,
+            "adjoint_solves": p.adjoint_solves,
+            "summary": p.summary(),
+        }
+        return cls(p.model, facts)
+
+    def to_json(self, path: Path) -> None:
+        """Write a JSON file in one step."""
+        write_text(path, json.dumps({"model": self.model.to_dict(), "facts": self.facts}, indent=1))
+
+    @classmethod
+    def from_json(cls, path: Path) -> Self:
+        """Read a file of `to_json`."""
+        content = json.loads(path.read_text(encoding="utf-8"))
+        return cls(StateSpaceModel.from_dict(content["model"]), content["facts"])
+
+
+@dataclass(frozen=True)
+class ProjectionExperiment(Experiment):
+    """A model projected from the linearised flow, from alpha and q; JSON."""
+
+    condition: FlightCondition
+    k_max: float
+    tolerance: float
+    suffix = "json"
+
+    @property
+    def label(self) -> str:
+        """The band."""
+        return f"projection up to k {self.k_max:g}"
+
+    @property
+    def whole(self) -> bool:
+        """About a state with sideslip there is no half."""
+        return self.condition.beta != 0.0
+
+    def depends_on(self) -> Iterator[Any]:
+        """Condition, band and tolerance."""
+        yield from (asdict(self.condition), self.k_max, self.tolerance)
+
+    def perform(self, solver: Solver, path: Path) -> None:
+        """Project."""
+        if not isinstance(solver, Linearises):
+            raise InputError(f"{type(solver).__name__} cannot be linearised: no model can be projected from it")
+        flow = next(flow for flow in solver.linearise(self.condition) if "alpha" in flow.inputs)
+        KeptProjection.of(project(flow, self.k_max, self.tolerance)).to_json(path)
 
 
 def _label(condition: FlightCondition, motion: Motion, steady: bool) -> str:
@@ -120,178 +267,3 @@ def _label(condition: FlightCondition, motion: Motion, steady: bool) -> str:
         elif name in ("p", "q", "r", "rate_amplitude") and value:
             parts.append(f"{'' if name == 'rate_amplitude' else name + ' '}{value:+.4g} rad/s")
     return " ".join(parts)
-
-
-class ExperimentPool:
-    """A solver whose experiments run in worker processes and are kept in files.
-
-    Safe to call from several threads at once, one for each method: that is what keeps the workers busy.
-
-    Parameters
-    ----------
-    factory : SolverFactory
-    reference : ReferenceQuantities
-    folder : Path
-        Where results are kept.
-    workers : int
-        Number of processes.
-    watch : callable, optional
-        Told label and fraction done of the experiments that run.
-    """
-
-    def __init__(
-        self,
-        factory: SolverFactory,
-        reference: ReferenceQuantities,
-        folder: Path,
-        workers: int,
-        watch: Watch | None = None,
-    ) -> None:
-        self._factory = factory
-        self._factory_key = factory.key()
-        self._reference = reference
-        self._folder = folder
-        self._watch = watch
-        self._lock = threading.Lock()
-        for unfinished in folder.glob(".*"):
-            # a file that a run was writing when it was ended, unless another run is writing it now
-            if time.time() - unfinished.stat().st_mtime > _ABANDONED:
-                unfinished.unlink(missing_ok=True)
-        self._futures: dict[str, Future[None]] = {}
-        share = max(1, (os.cpu_count() or 1) // workers)
-        context = multiprocessing.get_context("spawn")
-        self._queue = context.Queue()
-        self._executor = ProcessPoolExecutor(workers, context, _start_worker, (factory, self._queue, share))
-        self._listener = threading.Thread(target=self._listen, daemon=True)
-        self._listener.start()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._executor.shutdown(wait=False, cancel_futures=True)
-        if kind is not None:
-            # Half-done experiments are not waited for: their checkpoints are on disk.
-            for process in multiprocessing.active_children():
-                process.terminate()
-        self._executor.shutdown(wait=True)
-        self._queue.put(None)
-        self._listener.join()
-
-    @property
-    def reference(self) -> ReferenceQuantities:
-        """What the loads are made dimensionless with."""
-        return self._reference
-
-    def steady(self, condition: FlightCondition, rates: Rates = Rates()) -> SteadyLoads:
-        """Loads of the steady state at constant velocity and body rates; see `indicial.solver.Solver`."""
-        content = json.loads(self._result(condition, SteadyMotion(condition, rates), None).read_text(encoding="utf-8"))
-        return SteadyLoads(np.array(content["coefficients"]), condition, rates, self._reference, content["convergence"])
-
-    def unsteady(self, condition: FlightCondition, motion: Motion, times: ArrayLike) -> History:
-        """Loads at `times` [s] under `motion`; see `indicial.solver.Solver`."""
-        return History.from_netcdf(self._result(condition, motion, np.asarray(times, dtype=float)))
-
-    def _result(self, condition: FlightCondition, motion: Motion, times: Array | None) -> Path:
-        """The result file, once it is there."""
-        experiment = describe_experiment(self._factory_key, condition, motion, times)
-        path = self._folder / experiment.file_name
-        with self._lock:
-            future = self._futures.get(experiment.key)
-            if future is None and not path.is_file():
-                log.info("experiment %s", experiment.label)
-                future = self._executor.submit(_perform, experiment, path)
-                self._futures[experiment.key] = future
-        if future is not None:
-            try:
-                future.result()
-            except BrokenProcessPool as error:
-                raise IndicialError(
-                    f"{experiment.label}: a worker process was ended from outside (out of memory?); "
-                    "run again to resume, with fewer workers or a coarser mesh"
-                ) from error
-        if self._watch is not None:
-            self._watch(experiment.label, 1.0)
-        return path
-
-    def _listen(self) -> None:
-        while (message := self._queue.get()) is not None:
-            if self._watch is not None:
-                self._watch(*message)
-
-
-class _Worker:
-    """What a worker process holds: its solvers, and the line to the parent."""
-
-    def __init__(self, factory: SolverFactory, queue: Any) -> None:
-        self._factory, self._queue = factory, queue
-        self._solvers: dict[bool, Solver] = {}
-        self._label = ""
-
-    def perform(self, experiment: Experiment, path: Path) -> None:
-        self._label = experiment.label
-        self._report(0.0)
-        try:
-            if experiment.times is None:
-                self._steady(experiment, path)
-            else:
-                solver = self._solver(experiment.whole)
-                solver.unsteady(experiment.condition, experiment.motion, experiment.times).to_netcdf(path)
-        except DivergenceError as error:
-            raise DivergenceError(f"{experiment.label}: {error}") from error
-
-    def _steady(self, experiment: Experiment, path: Path) -> None:
-        solver = self._solver(experiment.whole)
-        rates = Rates(*(float(rate) for rate in experiment.motion.rate(0.0)))
-        loads = solver.steady(experiment.condition, rates)
-        content: dict[str, Any] = {
-            "experiment": experiment.label,
-            "coefficients": loads.coefficients.tolist(),
-            "convergence": loads.convergence,
-        }
-        if isinstance(solver, TellsConvergence):
-            history = solver.convergence(experiment.condition, rates)
-            content["history"] = {name: values.tolist() for name, values in history.to_arrays().items()}
-        write_text(path, json.dumps(content, indent=1))
-
-    def _solver(self, whole: bool) -> Solver:
-        if whole not in self._solvers:
-            self._solvers[whole] = self._factory.build(whole, self._report)
-        return self._solvers[whole]
-
-    def _report(self, fraction: float) -> None:
-        self._queue.put((self._label, fraction))
-
-
-_worker: _Worker | None = None
-
-
-def _start_worker(factory: SolverFactory, queue: Any, threads: int) -> None:
-    """Make the process a worker with its share of the cores."""
-    import signal
-
-    import numba
-    import threadpoolctl
-
-    numba.set_num_threads(min(threads, numba.get_num_threads()))
-    threadpoolctl.threadpool_limits(threads)
-    # Ctrl-C is the parent's to handle: it ends the workers.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    global _worker
-    _worker = _Worker(factory, queue)
-
-
-def _end_with_parent() -> None:
-    """A parent that was killed cannot end its workers: they see to it themselves."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
-
-
-def _perform(experiment: Experiment, path: Path) -> None:
-    assert _worker is not None
-    _worker.perform(experiment, path)

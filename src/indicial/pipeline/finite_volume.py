@@ -12,8 +12,8 @@ from indicial.cfd.mesh import Mesh, box_mesh
 from indicial.conventions import ReferenceQuantities
 from indicial.errors import DivergenceError
 from indicial.motion import AlphaStep, FlightCondition, PitchRateStep
-from indicial.pipeline.experiments import Fraction
 from indicial.pipeline.folder import digest
+from indicial.pipeline.pool import Fraction
 from indicial.report.space import FlowPicture
 from indicial.rom.simulation import simulate
 
@@ -68,7 +68,8 @@ class FiniteVolumeFactory:
 def compile_kernels() -> None:
     """Have every kernel of solver and model compiled and cached on disk, by solving next to nothing.
 
-    A disturbed box of a few cells goes through a steady state and two unsteady steps; one lag state takes a step.
+    A disturbed box of a few cells goes through a steady state and two unsteady steps, and is linearised; one lag state
+    takes a step.
     """
     simulate(-np.ones((1, 1)), np.ones((1, 1)), np.array([0.0, 1.0]), np.ones((2, 1)), np.zeros(1))
     condition = FlightCondition(2.0)
@@ -81,3 +82,7 @@ def compile_kernels() -> None:
         except DivergenceError:
             # Compiling was the purpose; the flow of three cells is not.
             continue
+    linearised = FiniteVolumeSolver(box_mesh((3, 3, 3)), reference).linearise(condition)[0]
+    for shift in (0.0, 0.5j):
+        for transposed in (False, True):
+            linearised.solve(np.ones(linearised.size), shift, transposed=transposed)

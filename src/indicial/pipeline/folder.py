@@ -52,6 +52,16 @@ class RunFolder:
         """Figures, PNG."""
         return self.path / "figures"
 
+    @property
+    def frequency_response(self) -> Path:
+        """H(ik) of the linearised flow, netCDF."""
+        return self.histories / "frequency_response.nc"
+
+    @property
+    def projected_model(self) -> Path:
+        """The model projected from the linearised flow, JSON, beside the one made of step responses."""
+        return self.path / "rom" / "projected.json"
+
     def mesh(self, whole: bool) -> Path:
         """The mesh of the whole model or of its half."""
         return self.path / "mesh" / ("whole.npz" if whole else "half.npz")

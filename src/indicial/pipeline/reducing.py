@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from indicial.rom import (
     check_prediction,
     realise,
 )
+from indicial.rom.realisation import channel_errors
 
 STEPS = ("alpha", "q")
 MOTIONS = ("pitch", "plunge")
@@ -40,7 +41,10 @@ def reduce(context: Context) -> Outcome:
     model.to_json(folder.path / "rom" / "model.json")
     model.to_netcdf(folder.path / "rom" / "model.nc")
     context.reporter.update(0.8, "prediction checks")
-    models: dict[str, ReducedModel] = {"convolution, Eq. 13": ConvolutionModel(responses), "state space": model}
+    spaces = {"state space": model}
+    if (projected := load_projected(context, model.outputs)) is not None:
+        spaces["projected"] = projected
+    models: dict[str, ReducedModel] = {"convolution, Eq. 13": ConvolutionModel(responses), **spaces}
     refused = ""
     try:
         models["deficiency, Eq. 16"] = QuasiSteadyModel.from_responses(responses)
@@ -55,8 +59,9 @@ def reduce(context: Context) -> Outcome:
         "order": model.order,
         "poles": [[pole.real, pole.imag] for pole in model.poles.tolist()],
         "realised_by": model.method,
-        "fit": [{"output": e.output, "input": e.input, "rms": e.rms, "peak": e.peak} for e in model.errors],
+        "fit": [asdict(error) for error in model.errors],
         "checks": checks,
+        "steps": [_against_steps(name, one, responses) for name, one in spaces.items()],
         "refused": refused,
         "out_of_phase_at_k": _out_of_phase(model, fom, context.case.forced_oscillation.k),
     }
@@ -70,11 +75,33 @@ def load_model(context: Context) -> StateSpaceModel:
     return StateSpaceModel.from_json(context.folder.path / "rom" / "model.json")
 
 
+def load_projected(context: Context, outputs: tuple[str, ...]) -> StateSpaceModel | None:
+    """The model that was projected from the linearised flow, for these loads; None if the case wants none."""
+    if context.folder.read("operator")["projection"] is None:
+        return None
+    model = StateSpaceModel.from_json(context.folder.projected_model)
+    rows = [model.outputs.index(output) for output in outputs]
+    kept = tuple(error for error in model.errors if error.output in outputs)
+    return replace(model, c=model.c[rows], d=model.d[rows], outputs=outputs, errors=kept)
+
+
+def step_models(context: Context) -> tuple[StepResponses, dict[str, StateSpaceModel]]:
+    """For the report: the marched step responses, and the models beside them."""
+    responses = StepResponses.from_netcdf(context.folder.path / "rom" / "step_responses.nc")
+    fitted = load_model(context)
+    projected = load_projected(context, fitted.outputs)
+    models = {"fitted to the steps": fitted, "projected from the operator": projected}
+    return responses, {name: model for name, model in models.items() if model is not None}
+
+
 def predictions(context: Context) -> dict[str, tuple[History, dict[str, Array]]]:
     """For the report: every checked history, and the coefficients that each model predicts, shape (n, 6)."""
     folder = context.folder
     responses = StepResponses.from_netcdf(folder.path / "rom" / "step_responses.nc")
-    models: dict[str, ReducedModel] = {"convolution": ConvolutionModel(responses), "state space": load_model(context)}
+    fitted = load_model(context)
+    models: dict[str, ReducedModel] = {"convolution": ConvolutionModel(responses), "state space": fitted}
+    if (projected := load_projected(context, fitted.outputs)) is not None:
+        models["projected"] = projected
     found = {}
     for motion in MOTIONS:
         history = History.from_netcdf(folder.histories / f"fom_{motion}.nc")
@@ -89,6 +116,12 @@ def _with_finals(responses: StepResponses, finals: dict[str, dict[str, float]]) 
         for response in responses.responses
     ]
     return replace(responses, responses=tuple(known))
+
+
+def _against_steps(name: str, model: StateSpaceModel, responses: StepResponses) -> dict[str, Any]:
+    """A model's step responses beside the marched ones."""
+    channels = [asdict(error) for error in channel_errors(model, responses)]
+    return {"model": name, "order": model.order, "channels": channels}
 
 
 def _check(model: ReducedModel, history: History) -> PredictionCheck:

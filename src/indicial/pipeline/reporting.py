@@ -13,13 +13,15 @@ from indicial.cfd import ConvergenceHistory
 from indicial.cfd.mesh import Mesh
 from indicial.derivatives import DerivativeTable
 from indicial.errors import InputError
+from indicial.frequency import FrequencyResponse
 from indicial.history import History
 from indicial.pipeline.context import Context, Outcome
 from indicial.pipeline.flying import load_flights
 from indicial.pipeline.identifying import load_record
-from indicial.pipeline.reducing import STEPS, predictions
+from indicial.pipeline.reducing import STEPS, load_projected, predictions, step_models
 from indicial.report.comparison import COLUMNS, ComparisonRow, comparison, comparison_figure
 from indicial.report.flight import LABELS, angle_figure, damping_figure, difference_figure, flight_figure, record_figure
+from indicial.report.frequency import frequency_figure, model_step_figure
 from indicial.report.html import Chapter, Grid, Picture, write_html
 from indicial.report.loads import convergence_figure, loop_figure, prediction_figure, step_figure
 from indicial.report.space import FlowPicture, flow_figure, mesh_figure
@@ -39,6 +41,7 @@ _KEYS = [
     "linearity",
     "measured_data",
     "mesh",
+    "operator",
     "rom",
     "statement",
     "timings_s",
@@ -52,7 +55,8 @@ def write_report(context: Context) -> Outcome:
     folder = context.folder
     results = _results(folder.path / "results.json")
     rows = comparison(DerivativeTable.from_records(results["derivatives"]))
-    makers = [_comparison, _mesh_and_flow, _moving_frame, _oscillations, _steps, _models, _flights, _identification]
+    makers = [_comparison, _mesh_and_flow, _moving_frame, _oscillations, _steps, _linearised]
+    makers += [_models, _flights, _identification]
     chapters = []
     for done, maker in enumerate(makers):
         chapter = maker(context, results, rows)
@@ -122,7 +126,8 @@ def _comparison(context: Context, results: dict[str, Any], rows: list[Comparison
             "over Mach number. It does not hold the error of the mesh.",
             "MRF: steady states in a "
             f"moving frame; FOM: forced oscillation at k = {results['case']['forced_oscillation']['k']:g}; IRM: "
-            "response to steps; model: the state-space model made of those responses, at k = 0; identified: from the "
+            "response to steps; operator: the flow linearised exactly about its steady state, at k = 0 and at the k of "
+            "the oscillation; model: the state-space model made of the step responses, at k = 0; identified: from the "
             "simulated range record of the flight that was flown with that model.",
             f"Measured data: {results['measured_data']}",
         ],
@@ -249,6 +254,51 @@ def _steps(context: Context, results: dict[str, Any], rows: list[ComparisonRow])
     return Chapter("Indicial response", [*tails, *refused], (), [picture])
 
 
+def _linearised(context: Context, results: dict[str, Any], rows: list[ComparisonRow]) -> Chapter:
+    found, k, band = results["operator"], context.case.forced_oscillation.k, context.case.operator.k_max
+    response = FrequencyResponse.from_netcdf(context.folder.frequency_response)
+    table = DerivativeTable.from_records(results["derivatives"]).select(method="operator")
+    columns = (None, *sorted({record.k for record in table if record.k is not None}))
+    cells = [
+        [name, *(", ".join(f"{r.value:.5g}" for r in table.select(name=name, k=at)) or "–" for at in columns)]
+        for name in table.names()
+        if not name.startswith("CA_")
+    ]
+    headings = ["derivative", *("k = 0" if at is None else f"k = {at:g}" for at in columns)]
+    text = [
+        "The exact Jacobian of the discrete flow about its steady state answers to small motions of any frequency by "
+        "linear solves, without a march.",
+        *(f"Refused: {reason}" for reason in found["refused"].values()),
+    ]
+    if "solves" in found["provenance"]:
+        text.append("The table took {solves} solutions and {products} products with J.".format(**found["provenance"]))
+    model = None
+    if found["projection"] is not None:
+        model = load_projected(context, ("CN", "Cm"))
+        text += found["projection"]["summary"].splitlines()
+    oscillations = context.folder.read("fom")["ellipses"]
+    caption = (
+        "Dots: frequencies solved for; line: the model projected from the same flow; crosses: the marched "
+        "oscillations, which must lie on it. At k = 0 out of phase: the derivative of alphadot in plunge, the damping "
+        "sum in pitch."
+    )
+    picture = _picture(
+        context, "frequency_response", lambda: frequency_figure(response, model, band, oscillations, k), caption
+    )
+    return Chapter("Linearised flow", text, [Grid(headings, cells, "Derivatives by the operator")], [picture])
+
+
+def _step_errors(results: dict[str, Any]) -> Grid:
+    steps = results["rom"]["steps"]
+    channels = [(e["output"], e["input"]) for e in steps[0]["channels"]]
+    cells = [
+        [f"{entry['model']}, {entry['order']} states", *(f"{e['rms']:.2%}" for e in entry["channels"])]
+        for entry in steps
+    ]
+    headings = ["model", *(f"{output} to {cause}" for output, cause in channels)]
+    return Grid(headings, cells, "Error of the step response, rms relative to its unsteady part; the fit has seen it")
+
+
 def _models(context: Context, results: dict[str, Any], rows: list[ComparisonRow]) -> Chapter:
     cells = [
         [
@@ -271,8 +321,16 @@ def _models(context: Context, results: dict[str, Any], rows: list[ComparisonRow]
     if results["rom"]["refused"]:
         text.append(results["rom"]["refused"])
     caption = "CFD oscillations that the models have not seen, and what the models predict of them."
-    picture = _picture(context, "predictions", lambda: prediction_figure(predictions(context)), caption)
-    return Chapter("Reduced-order model", text, [grid], [picture])
+    pictures = [
+        _picture(context, "predictions", lambda: prediction_figure(predictions(context)), caption),
+        _picture(
+            context,
+            "model_steps",
+            lambda: model_step_figure(*step_models(context)),
+            "Step responses: marched, of the model fitted to them, and of the model projected without them.",
+        ),
+    ]
+    return Chapter("Reduced-order model", text, [grid, _step_errors(results)], pictures)
 
 
 def _flights(context: Context, results: dict[str, Any], rows: list[ComparisonRow]) -> Chapter:

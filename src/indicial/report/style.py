@@ -18,26 +18,41 @@ BLUE, VERMILION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#7F7F7F"
 
 METHOD_COLOURS = {
     "mrf": BLUE,
-    "fom": ORANGE,
     "irm": GREEN,
+    "operator": SKY,
     "rom": PURPLE,
+    "fom": ORANGE,
+    "operator_at_k": SKY,
     "identified": VERMILION,
     "measured": BLACK,
 }
-METHOD_MARKERS = {"mrf": "o", "fom": "s", "irm": "^", "rom": "v", "identified": "D", "measured": "*"}
+METHOD_MARKERS = {
+    "mrf": "o",
+    "irm": "^",
+    "operator": "P",
+    "rom": "v",
+    "fom": "s",
+    "operator_at_k": "X",
+    "identified": "D",
+    "measured": "*",
+}
 METHOD_NAMES = {
     "mrf": "moving frame (MRF)",
-    "fom": "forced oscillation (FOM)",
     "irm": "indicial response (IRM)",
+    "operator": "linearised flow (operator)",
     "rom": "reduced-order model",
+    "fom": "forced oscillation (FOM)",
+    "operator_at_k": "operator at the k of FOM",
     "identified": "identified from the flight",
     "measured": "measured in free flight",
 }
 METHOD_SHORT = {
     "mrf": "MRF",
-    "fom": "FOM",
     "irm": "IRM",
+    "operator": "operator",
     "rom": "model",
+    "fom": "FOM",
+    "operator_at_k": "operator at k",
     "identified": "identified",
     "measured": "free flight",
 }
