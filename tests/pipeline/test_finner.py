@@ -46,7 +46,7 @@ def test_the_model_made_of_steps_predicts_the_damping_of_the_oscillation(results
 
 
 def test_the_operator_agrees_with_every_march_at_its_own_frequency(results):
-    """One linear flow, one mesh: they differ by amplitude, time step and tolerance alone, a tenth of the mesh's error."""
+    """One linear flow, one mesh: they differ by amplitude, time step and tolerance alone."""
     pairs = {(e["what"], e["name"]): abs(e["difference"]) for e in results["agreement"] if "operator" in e["what"]}
     assert len(pairs) == 9
     assert max(pairs.values()) < 5e-3
