@@ -9,11 +9,11 @@ EXAMPLES = sorted((Path(__file__).resolve().parents[1] / "examples").glob("*.py"
 
 
 def test_there_is_an_example_for_every_stage():
-    assert [path.name[0] for path in EXAMPLES] == list("123456")
+    assert [path.name[0] for path in EXAMPLES] == list("1234567")
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_example_runs(path, tmp_path, monkeypatch):
-    # the last one guards its work by __main__, for it takes minutes: here it is only imported
+    # the sixth guards its work by __main__, for it takes minutes: here it is only imported
     monkeypatch.chdir(tmp_path)
     runpy.run_path(str(path), run_name="example")

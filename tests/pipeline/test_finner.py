@@ -40,7 +40,9 @@ def test_the_three_reductions_of_the_oscillation_agree(table, load):
 
 def test_the_model_made_of_steps_predicts_the_damping_of_the_oscillation(results):
     """FOM at k against the state-space model at the same k: two time marches of one linear flow."""
-    errors = [abs(e["difference"]) for e in results["agreement"] if e["what"].startswith("sum at the same k: FOM, reduced")]
+    errors = [
+        abs(e["difference"]) for e in results["agreement"] if e["what"].startswith("sum at the same k: FOM, reduced")
+    ]
     assert len(errors) == 2
     assert max(errors) < 0.01
 

@@ -53,6 +53,11 @@ def test_case_gives_condition_and_reference_in_si_units_and_radians():
             '["alpha", "q", "w"]',
             r"operator\.inputs: is 'w'; allowed: a list, each 'alpha' or 'q'",
         ),
+        (
+            "[rom]",
+            "[flow]\nsteady_tolerance = 1e-5\n[rom]",
+            r"flow\.steady_tolerance: is 1e-05; allowed: .* most 1e-06",
+        ),
         ('["alpha", "q", "p"]', '["alpha"]', r"operator\.inputs: lacks alpha or q.* allowed: both"),
         ('["alpha", "q", "p"]', '["alpha", "q", "q"]', r"operator\.inputs: holds one twice; allowed: each once"),
         ('nose = "cone"', 'nose = "blunt"', r"shape\.nose: is 'blunt'; allowed: 'cone' or 'tangent_ogive'"),

@@ -258,11 +258,13 @@ def _linearised(context: Context, results: dict[str, Any], rows: list[Comparison
     found, k, band = results["operator"], context.case.forced_oscillation.k, context.case.operator.k_max
     response = FrequencyResponse.from_netcdf(context.folder.frequency_response)
     table = DerivativeTable.from_records(results["derivatives"]).select(method="operator")
+    # loads that do not answer, by symmetry, are round-off
+    floor = 1e-6 * max(abs(record.value) for record in table)
+    names = [n for n in table.names() if any(abs(record.value) > floor for record in table.select(name=n))]
     columns = (None, *sorted({record.k for record in table if record.k is not None}))
     cells = [
         [name, *(", ".join(f"{r.value:.5g}" for r in table.select(name=name, k=at)) or "–" for at in columns)]
-        for name in table.names()
-        if not name.startswith("CA_")
+        for name in names
     ]
     headings = ["derivative", *("k = 0" if at is None else f"k = {at:g}" for at in columns)]
     text = [

@@ -82,17 +82,20 @@ def _parts(
     return h.real, h.imag / k
 
 
-def model_step_figure(responses: StepResponses, models: Mapping[str, StateSpaceModel]) -> Figure:
-    """Marched step responses, and those of models, by name."""
+def model_step_figure(
+    responses: StepResponses, models: Mapping[str, StateSpaceModel], known: str = "marched"
+) -> Figure:
+    """Step responses that are known, and those of models, by name, to the inputs that all of them have."""
+    shared = [name for name in responses.inputs if all(name in model.inputs for model in models.values())]
     with figure_style() as plt:
         figure: Figure
-        figure, panels = plt.subplots(2, len(responses.inputs), figsize=(9.6, 6.2), squeeze=False, sharex="col")
-        for column, stepped in enumerate(responses.inputs):
+        figure, panels = plt.subplots(2, len(shared), figsize=(9.6, 6.2), squeeze=False, sharex="col")
+        for column, stepped in enumerate(shared):
             s = responses[stepped].s
             fine = np.linspace(0.0, float(s[-1]), 400)
             for row, name in enumerate(PAIR):
                 axes = panels[row, column]
-                axes.plot(*responses.channel(name, stepped), ".", color=GREY, ms=5, label="marched")
+                axes.plot(*responses.channel(name, stepped), ".", color=GREY, ms=5, label=known)
                 for colour, line, (title, model) in zip((BLUE, VERMILION), ("-", "--"), models.items(), strict=False):
                     label = f"{title}, {model.order} states"
                     axes.plot(*model.step(fine).channel(name, stepped), line, color=colour, lw=1.2, label=label)
