@@ -20,12 +20,12 @@ class Figure:
     @classmethod
     def at_most(cls, name: str, value: float, limit: float, unit: str = "") -> Figure:
         """A figure that holds up to `limit`."""
-        return cls(name, value, unit, f"at most {limit:g}", value <= limit)
+        return cls(name, float(value), unit, f"at most {limit:g}", bool(value <= limit))
 
     @classmethod
     def at_least(cls, name: str, value: float, limit: float, unit: str = "") -> Figure:
         """A figure that holds from `limit` on."""
-        return cls(name, value, unit, f"at least {limit:g}", value >= limit)
+        return cls(name, float(value), unit, f"at least {limit:g}", bool(value >= limit))
 
     def line(self) -> str:
         """The figure for a reader."""
