@@ -101,6 +101,7 @@ def _draw(cells: np.ndarray, runs: list[dict[str, float]], exponents: dict[str, 
 
     mpl.use("Agg")
     import matplotlib.pyplot as plt
+    from matplotlib.ticker import NullFormatter
 
     figure, axes = plt.subplots(1, 2, figsize=(9.0, 3.6))
     for axis, keys, label, unit in (
@@ -111,6 +112,7 @@ def _draw(cells: np.ndarray, runs: list[dict[str, float]], exponents: dict[str, 
             name = QUANTITIES[key].split(" [")[0]
             axis.loglog(cells, [unit * run[key] for run in runs], "o-", label=f"{name}, cells^{exponents[key]:.2f}")
         axis.set_xlabel("cells")
+        axis.xaxis.set_minor_formatter(NullFormatter())
         axis.set_ylabel(label)
         axis.grid(True, which="both", alpha=0.3)
         axis.legend()
