@@ -10,7 +10,7 @@ from indicial.cfd import FiniteVolumeSolver, FlowSettings
 from indicial.cfd.flow import STILL_AIR, Grid, Jacobian, MeshMotion, Residual
 from indicial.cfd.flow.gas import conservative_jacobian
 from indicial.cfd.march import Pattern
-from indicial.cfd.march.harmonic import PeriodicResidual, spectral_derivative
+from indicial.cfd.march.time_spectral import PeriodicResidual, spectral_derivative
 from indicial.cfd.mesh import box_mesh, plate_mesh
 from indicial.conventions import ReferenceQuantities
 from indicial.errors import DivergenceError, InputError

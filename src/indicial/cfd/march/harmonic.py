@@ -1,53 +1,28 @@
-r"""Periodic flows by the time-spectral method, also called harmonic balance.
+"""Periodic flows: the time-spectral equations solved for all instants together, by the continuation of steady states.
 
-A flow that repeats itself with angular frequency omega, truncated after h harmonics, is known by its states at
-N = 2h + 1 equispaced instants of one period. There
-
-    V omega sum_m D_nm W(q_m) + R(q_n; V_b(t_n), omega(t_n)) = 0,   n = 0, ..., N - 1,
-    D_nm = (-1)^(n-m) / (2 sin(pi (n - m) / N)),   D_nn = 0,
-
-D being the exact derivative, with respect to omega t, of the trigonometric polynomial of degree h through N values
-(Gopinath & Jameson 2005; Hall, Thomas & Clark 2002 in the frequency domain). The N states are coupled by D alone.
-They are solved together by Newton's method with the exact Jacobian and pseudo-time continuation, as a steady state
-is. The preconditioner treats the instants one by one and then, in the frequency domain, where D is diagonal, the
-harmonics.
+An oscillation of a few degrees is taken straight to the second-order scheme from the steady state at its mean; what
+starts further off goes through the first-order one.
 """
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from indicial.cfd.flow.gas import conservative, conservative_jacobian
-from indicial.cfd.flow.jacobian import Jacobian
 from indicial.cfd.flow.residual import MeshMotion, Residual
+from indicial.cfd.march.continuation import continuation
 from indicial.cfd.march.convergence import ConvergenceHistory, Recorder
-from indicial.cfd.march.ilu import BlockILU, Pattern
-from indicial.cfd.march.krylov import Operator, gmres
-from indicial.cfd.march.steady import Progress, limited_update, local_time_step, residual_scale, round_off
+from indicial.cfd.march.ilu import Pattern
+from indicial.cfd.march.steady import Progress, limited_update, residual_scale
+from indicial.cfd.march.time_spectral import PeriodicJacobian, PeriodicResidual
 from indicial.conventions import Array
-from indicial.errors import DivergenceError, InputError
-from indicial.solver import instants
 
-log = logging.getLogger(__name__)
-
-_LEAST_CFL, _LARGEST_CFL = 2e-3, 1e8
-_LARGEST_RISE = 3.0
 _NEAR = 1e-2
 """Residual of a start from which the second-order scheme is taken at once."""
-
-
-def spectral_derivative(harmonics: int) -> Array:
-    """D: values at `instants` to their derivatives with respect to the phase, exact to degree h, shape (N, N)."""
-    phase = instants(harmonics)
-    n = phase.size
-    apart = np.subtract.outer(np.arange(n), np.arange(n))
-    off = np.sin(0.5 * (phase[:, None] - phase[None, :])) + np.eye(n)
-    d: Array = np.where(apart == 0, 0.0, 0.5 * (-1.0) ** apart / off)
-    return d
+_START_CFL, _NEARBY_CFL = 20.0, 100.0
 
 
 @dataclass(frozen=True)
@@ -65,118 +40,6 @@ class PeriodicState:
 
     q: Array
     history: ConvergenceHistory
-
-
-class PeriodicResidual:
-    """``F_n = V omega sum_m D_nm W(q_m) + R(q_n; motion_n)`` and its linearisation.
-
-    Parameters
-    ----------
-    residual : Residual
-    motions : sequence of MeshMotion
-        At the N = 2h + 1 instants.
-    omega : float
-        Angular frequency, solver units.
-    """
-
-    def __init__(self, residual: Residual, motions: Sequence[MeshMotion], omega: float) -> None:
-        self.residual = residual
-        self.motions = tuple(motions)
-        self.omega = omega
-        if len(self.motions) % 2 == 0:
-            raise InputError(f"a periodic flow at {len(self.motions)} instants: their number must be odd, 3 or more")
-        self.round_off = 0.0
-        """What double precision leaves of F at the last states evaluated."""
-        self._rate: Array = omega * spectral_derivative(len(self.motions) // 2)
-
-    def __call__(self, q: Array) -> Array:
-        """F, shape (N, nc, 5)."""
-        f = self.time_derivative(self.residual.grid.volume[:, None] * conservative(q))
-        left = []
-        for n, motion in enumerate(self.motions):
-            f[n] += self.residual(q[n], motion)
-            left.append(round_off(self.residual))
-        self.round_off = float(np.linalg.norm(left))
-        return f
-
-    def time_derivative(self, w: Array) -> Array:
-        """``dw/dt`` of values w at the instants, (N, ...)."""
-        derivative: Array = np.tensordot(self._rate, w, axes=1)
-        return derivative
-
-    def time_step(self, q: Array) -> Array:
-        """Local step of CFL 1 at each instant, shape (N, nc)."""
-        grid = self.residual.grid
-        return np.stack([local_time_step(grid, q[n], motion) for n, motion in enumerate(self.motions)])
-
-    def linearise(self, q: Array, damping: Array) -> PeriodicJacobian:
-        """dF/dq with a pseudo-time term, `damping` (N, nc) the inverse of its step."""
-        jacobians = [Jacobian(self.residual, q[n], motion) for n, motion in enumerate(self.motions)]
-        mass = self.residual.grid.volume[:, None, None] * conservative_jacobian(q)
-        return PeriodicJacobian(self, jacobians, mass, damping)
-
-
-class PeriodicJacobian:
-    """dF/dq plus a pseudo-time term at N states: one Jacobian for each instant, coupled by the time derivative.
-
-    Parameters
-    ----------
-    periodic : PeriodicResidual
-    jacobians : list of Jacobian
-    mass : ndarray
-        ``V dW/dq`` at the instants (N, nc, 5, 5).
-    damping : ndarray
-        Inverse of the pseudo-time step (N, nc).
-    """
-
-    def __init__(self, periodic: PeriodicResidual, jacobians: list[Jacobian], mass: Array, damping: Array) -> None:
-        self._periodic = periodic
-        self._jacobians = jacobians
-        self._mass = mass
-        self._damping = damping
-        self.products = 0
-
-    def apply(self, x: Array) -> Array:
-        """``(damping V dW/dq + dF/dq) x``, shape (N, nc, 5)."""
-        w = np.einsum("ncij,ncj->nci", self._mass, x)
-        y: Array = self._periodic.time_derivative(w) + self._damping[..., None] * w
-        for n, jacobian in enumerate(self._jacobians):
-            y[n] += jacobian.apply(x[n])
-        self.products += len(self._jacobians)
-        return y
-
-    def preconditioner(self, pattern: Pattern) -> Operator:
-        """An approximate inverse in two strokes: each instant by itself, then each harmonic of what is left.
-
-        The first inverts J of every instant without the coupling, the second ``i n omega V E + J`` of the means over
-        the period: shocks that move need the one; the far field, where waves cross a cell in a good part of the
-        period, the other.
-        """
-        count = len(self._jacobians)
-        extra = self._damping[..., None, None] * self._mass
-        mean = np.zeros((len(pattern.indices), 5, 5))
-        at_instants = []
-        for n, jacobian in enumerate(self._jacobians):
-            blocks = jacobian.compact_blocks(extra[n], pattern.slots, pattern.diagonal, len(pattern.indices))
-            mean += blocks / count
-            at_instants.append(BlockILU(pattern, blocks))
-        mean_mass = self._mass.mean(axis=0)
-        of_harmonics = [BlockILU(pattern, mean.copy())]
-        for n in range(1, count // 2 + 1):
-            shifted = mean.astype(complex)
-            shifted[pattern.diagonal] += 1j * n * self._periodic.omega * mean_mass
-            of_harmonics.append(BlockILU(pattern, shifted))
-
-        def solve(b: Array) -> Array:
-            x = np.stack([ilu.solve(b[n]) for n, ilu in enumerate(at_instants)])
-            spectrum = np.fft.rfft(b - self.apply(x), axis=0)
-            spectrum[0] = of_harmonics[0].solve(spectrum[0].real.copy())
-            for n in range(1, len(of_harmonics)):
-                spectrum[n] = of_harmonics[n].solve(spectrum[n])
-            x += np.fft.irfft(spectrum, count, axis=0)
-            return x
-
-        return solve
 
 
 def converge_periodic(
@@ -210,73 +73,68 @@ def converge_periodic(
     DivergenceError
         If it is not reached; its `state` holds the last states (N, nc, 5).
     """
-    periodic = PeriodicResidual(residual, motions, omega)
+    equations = _PeriodicEquations(PeriodicResidual(residual, motions, omega), pattern)
     scale = float(np.linalg.norm([residual_scale(residual, motion) for motion in motions]))
     q = np.broadcast_to(start, (len(motions), *start.shape[-2:])).copy()
     record = Recorder()
-    if float(np.linalg.norm(periodic(q))) > _NEAR * scale:
-        plain = PeriodicResidual(Residual(residual.grid, second_order=False, far=residual.far), motions, omega)
-        q = _iterate(plain, pattern, q, scale, _NEAR, 20.0, iterations, record, None)
-    q = _iterate(periodic, pattern, q, scale, tolerance, 100.0, iterations, record, progress)
-    return PeriodicState(q, record.history(periodic.round_off / scale))
-
-
-def _iterate(
-    periodic: PeriodicResidual,
-    pattern: Pattern,
-    q: Array,
-    scale: float,
-    tolerance: float,
-    cfl: float,
-    iterations: int,
-    record: Recorder,
-    progress: Progress | None,
-) -> Array:
-    """Newton steps from q until F is `tolerance` of `scale`, or what round-off leaves of it."""
-
-    def note(norm: float, cfl: float) -> None:
-        record.note(norm, cfl, periodic.residual.second_order)
-        log.debug("residual %.2e, CFL %.1e, %d products", norm, cfl, record.products)
-
-    f = periodic(q)
-    norm = float(np.linalg.norm(f)) / scale
-    first = max(norm, 10.0 * tolerance)
-    note(norm, 0.0)
-    while norm > max(tolerance, periodic.round_off / scale):
-        if iterations == 0 or cfl < _LEAST_CFL:
-            raise _divergence(periodic, q, f, norm, tolerance, record.steps)
-        iterations -= 1
-        forcing = max(0.1 if cfl < 1e3 else 1e-2, 0.3 * tolerance / norm)
-        jacobian = periodic.linearise(q, 1.0 / (cfl * periodic.time_step(q)))
-        try:
-            solution = gmres(jacobian.apply, jacobian.preconditioner(pattern), -f, forcing)
-        except DivergenceError:
-            cfl *= 0.1
-            continue
-        record.products += jacobian.products
-        trial = limited_update(q.reshape(-1, 5), solution.x.reshape(-1, 5)).reshape(q.shape)
-        f_trial = periodic(trial)
-        norm_trial = float(np.linalg.norm(f_trial)) / scale
-        if not norm_trial < _LARGEST_RISE * norm:
-            cfl *= 0.1
-            continue
-        note(norm_trial, cfl)
-        # a step that the linear solver could not finish was too long
-        solved = solution.relative_residual <= forcing
-        cfl = min(cfl * (1.2 * float(np.clip(norm / norm_trial, 0.3, 8.0)) if solved else 0.3), _LARGEST_CFL)
-        q, f, norm = trial, f_trial, norm_trial
-        if progress is not None:
-            progress(float(np.clip(np.log(first / norm) / np.log(first / tolerance), 0.0, 1.0)))
-    return q
-
-
-def _divergence(
-    periodic: PeriodicResidual, q: Array, f: Array, norm: float, tolerance: float, steps: int
-) -> DivergenceError:
-    worst = int(np.argmax(np.sum(f**2, axis=(0, 2)) / periodic.residual.grid.volume**2))
-    return DivergenceError(
-        f"the periodic solution stopped at a residual of {norm:.1e} (wanted {tolerance:.1e}) after {steps} Newton "
-        "steps: allow more, or try fewer harmonics, a smaller amplitude or a smoother mesh",
-        cell=worst,
-        state=q,
+    if float(np.linalg.norm(equations(q))) > _NEAR * scale:
+        plain = Residual(residual.grid, second_order=False, far=residual.far)
+        q = continuation(
+            _PeriodicEquations(PeriodicResidual(plain, motions, omega), pattern),
+            q,
+            scale=scale,
+            tolerance=_NEAR,
+            cfl=_START_CFL,
+            iterations=iterations,
+            record=record,
+        )
+    q = continuation(
+        equations,
+        q,
+        scale=scale,
+        tolerance=tolerance,
+        cfl=_NEARBY_CFL,
+        iterations=iterations,
+        record=record,
+        progress=progress,
     )
+    return PeriodicState(q, record.history(equations.round_off() / scale))
+
+
+@dataclass(frozen=True)
+class _PeriodicEquations:
+    """F = 0 at all instants, for the `continuation`."""
+
+    periodic: PeriodicResidual
+    pattern: Pattern
+    name: ClassVar[str] = "periodic"
+    advice: ClassVar[str] = "fewer harmonics, a smaller amplitude or a smoother mesh"
+
+    @property
+    def residual(self) -> Residual:
+        return self.periodic.residual
+
+    def __call__(self, q: Array) -> Array:
+        return self.periodic(q)
+
+    def round_off(self) -> float:
+        return self.periodic.round_off
+
+    def linearise(self, q: Array, cfl: float) -> _Linearised:
+        return _Linearised(self.periodic.linearise(q, 1.0 / (cfl * self.periodic.time_step(q))), self.pattern)
+
+    def update(self, q: Array, dq: Array) -> Array:
+        return limited_update(q, dq)
+
+
+class _Linearised:
+    """The coupled Jacobian with its preconditioner."""
+
+    def __init__(self, jacobian: PeriodicJacobian, pattern: Pattern) -> None:
+        self._jacobian = jacobian
+        self.apply = jacobian.apply
+        self.precondition = jacobian.preconditioner(pattern)
+
+    @property
+    def products(self) -> int:
+        return self._jacobian.products

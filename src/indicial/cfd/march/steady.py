@@ -1,42 +1,32 @@
 r"""Steady states by Newton-Krylov with pseudo-time continuation.
 
-Each iteration solves ``(V/dtau dW/dq + J) dq = -R`` with the exact J. The pseudo-time step grows as the residual
-falls (switched evolution relaxation, Mulder & van Leer 1985) until the iteration is Newton's own. An impulsive
+Each iteration solves ``(V/dtau dW/dq + J) dq = -R`` with the exact J, by the rules of `continuation`. An impulsive
 start goes through the first-order scheme, which nothing upsets, to the second-order one.
-
-On its way to its place a shock raises the residual, so a step may: only one that raises it threefold is taken back.
-(Asked never to raise it, by a line search, the iteration takes up to three times the steps to a transonic flow.)
 """
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from indicial.cfd.flow.gas import GAMMA, STILL_AIR, P, conservative_jacobian
+from indicial.cfd.flow.gas import GAMMA, RHO, STILL_AIR, P, conservative_jacobian
 from indicial.cfd.flow.grid import Grid
 from indicial.cfd.flow.jacobian import Jacobian
 from indicial.cfd.flow.residual import MeshMotion, Residual, gather
+from indicial.cfd.march.continuation import continuation
 from indicial.cfd.march.convergence import ConvergenceHistory, Recorder
 from indicial.cfd.march.ilu import BlockILU, Pattern
-from indicial.cfd.march.krylov import KrylovResult, gmres
 from indicial.conventions import Array
-from indicial.errors import DivergenceError
-
-log = logging.getLogger(__name__)
 
 Progress = Callable[[float], None]
 """Told the fraction done, 0 to 1."""
 
 _START_CFL = 20.0
 _NEARBY_CFL = 1e4
-_NEWTON_CFL = 1e8
-_LEAST_CFL = 2e-3
 _FIRST_ORDER_TOLERANCE = 1e-3
-_LARGEST_RISE = 3.0
 _LARGEST_CHANGE = 0.4
 
 
@@ -117,109 +107,76 @@ def converge(
     """
     scale = residual_scale(residual, motion)
     record = Recorder()
-    second = _Continuation(residual, pattern, motion, scale, record, progress)
     if start is None:
         plain = Residual(residual.grid, second_order=False, far=residual.far)
-        first = _Continuation(plain, pattern, motion, scale, record)
-        q = np.broadcast_to(residual.far, (residual.grid.n_cells, 5)).copy()
-        q = first.run(q, _FIRST_ORDER_TOLERANCE, _START_CFL, iterations)
-        q = second.run(q, tolerance, _START_CFL, iterations)
+        q = continuation(
+            _SteadyEquations(plain, pattern, motion),
+            np.broadcast_to(residual.far, (residual.grid.n_cells, 5)).copy(),
+            scale=scale,
+            tolerance=_FIRST_ORDER_TOLERANCE,
+            cfl=_START_CFL,
+            iterations=iterations,
+            record=record,
+        )
     else:
-        q = second.run(start.copy(), tolerance, _NEARBY_CFL, iterations)
+        q = start.copy()
+    q = continuation(
+        _SteadyEquations(residual, pattern, motion),
+        q,
+        scale=scale,
+        tolerance=tolerance,
+        cfl=_START_CFL if start is None else _NEARBY_CFL,
+        iterations=iterations,
+        record=record,
+        progress=progress,
+    )
     return SteadyState(q, motion, record.history(round_off(residual) / scale))
 
 
-@dataclass
-class _Continuation:
-    """Pseudo-time continuation of one residual into Newton's iteration."""
+@dataclass(frozen=True)
+class _SteadyEquations:
+    """``R(q; V_b, omega) = 0`` for the `continuation`."""
 
     residual: Residual
     pattern: Pattern
     motion: MeshMotion
-    scale: float
-    record: Recorder
-    progress: Progress | None = None
+    name: ClassVar[str] = "steady"
+    advice: ClassVar[str] = "a finer or smoother mesh, or a start from a nearby condition"
 
-    def run(self, q: Array, tolerance: float, cfl: float, iterations: int) -> Array:
-        """Newton steps from q until the residual is `tolerance` of the scale."""
-        r, norm = self._evaluate(q)
-        first = max(norm, 10.0 * tolerance)
-        self._note(norm, 0.0)
-        while norm > max(tolerance, round_off(self.residual) / self.scale):
-            if iterations == 0 or cfl < _LEAST_CFL:
-                raise self._divergence(q, r, norm, tolerance, cfl)
-            iterations -= 1
-            # Newton's last steps are worth accurate solutions, the last of all no more than what is wanted of it
-            forcing = max(0.1 if cfl < 1e3 else 1e-2, 0.3 * tolerance / norm)
-            solution = self._solve(q, r, cfl, forcing)
-            if solution is None:
-                cfl *= 0.1
-                continue
-            trial = limited_update(q, solution.x)
-            r_trial, norm_trial = self._evaluate(trial)
-            if not norm_trial < _LARGEST_RISE * norm:
-                cfl *= 0.1
-                continue
-            self._note(norm_trial, cfl)
-            # a step that the linear solver could not finish was too long
-            solved = solution.relative_residual <= forcing
-            cfl *= 1.2 * float(np.clip(norm / norm_trial, 0.3, 8.0)) if solved else 0.3
-            cfl = min(cfl, _NEWTON_CFL)
-            q, r, norm = trial, r_trial, norm_trial
-            self._tell(np.log(first / norm) / np.log(first / tolerance))
-        return q
+    def __call__(self, q: Array) -> Array:
+        return self.residual(q, self.motion)
 
-    def _evaluate(self, q: Array) -> tuple[Array, float]:
-        """Residual of q and its norm over the scale."""
-        r = self.residual(q, self.motion)
-        return r, float(np.linalg.norm(r)) / self.scale
+    def round_off(self) -> float:
+        return round_off(self.residual)
 
-    def _solve(self, q: Array, r: Array, cfl: float, forcing: float) -> KrylovResult | None:
-        """The step of a pseudo-time step of size `cfl`; None if its matrix is singular."""
-        grid, pattern = self.residual.grid, self.pattern
+    def linearise(self, q: Array, cfl: float) -> _SteadyJacobian:
+        grid = self.residual.grid
         dt = cfl * local_time_step(grid, q, self.motion)
         mass = (grid.volume / dt)[:, None, None] * conservative_jacobian(q)
-        jacobian = Jacobian(self.residual, q, self.motion)
+        return _SteadyJacobian(Jacobian(self.residual, q, self.motion), mass, self.pattern)
+
+    def update(self, q: Array, dq: Array) -> Array:
+        return limited_update(q, dq)
+
+
+class _SteadyJacobian:
+    """``V/dtau dW/dq + J`` and its incomplete factorisation."""
+
+    def __init__(self, jacobian: Jacobian, mass: Array, pattern: Pattern) -> None:
+        self._jacobian, self._mass = jacobian, mass
         blocks = jacobian.compact_blocks(mass, pattern.slots, pattern.diagonal, len(pattern.indices))
-        try:
-            ilu = BlockILU(pattern, blocks)
-        except DivergenceError:
-            return None
+        self.precondition = BlockILU(pattern, blocks).solve
+        self.products = 0
 
-        def shifted(x: Array) -> Array:
-            y: Array = jacobian.apply(x) + np.einsum("nij,nj->ni", mass, x)
-            return y
-
-        solution = gmres(shifted, ilu.solve, -r, forcing)
-        self.record.products += solution.products
-        return solution
-
-    def _note(self, norm: float, cfl: float) -> None:
-        self.record.note(norm, cfl, self.residual.second_order)
-        log.debug("residual %.2e, CFL %.1e, %d products", norm, cfl, self.record.products)
-
-    def _tell(self, fraction: float) -> None:
-        if self.progress is not None:
-            self.progress(float(np.clip(fraction, 0.0, 1.0)))
-
-    def _divergence(self, q: Array, r: Array, norm: float, tolerance: float, cfl: float) -> DivergenceError:
-        worst = int(np.argmax(np.sum((r / self.residual.grid.volume[:, None]) ** 2, axis=1)))
-        why = (
-            "no pseudo-time step is short enough; try a finer or smoother mesh"
-            if cfl < _LEAST_CFL
-            else "no more steps are allowed; allow more, or try a finer or smoother mesh"
-        )
-        return DivergenceError(
-            f"the steady solution stopped at a residual of {norm:.1e} (wanted {tolerance:.1e}) after "
-            f"{self.record.steps} Newton steps: {why}, or a start from a nearby condition",
-            cell=worst,
-            state=q,
-        )
+    def apply(self, x: Array) -> Array:
+        self.products += 1
+        y: Array = self._jacobian.apply(x) + np.einsum("nij,nj->ni", self._mass, x)
+        return y
 
 
 def limited_update(q: Array, dq: Array) -> Array:
-    """q + dq, cell by cell shortened so that density and pressure change by at most a part."""
-    ratio = np.maximum(np.abs(dq[:, 0] / q[:, 0]), np.abs(dq[:, P] / q[:, P]))
+    """q + dq (..., 5), cell by cell shortened so that density and pressure change by at most a part."""
+    ratio = np.maximum(np.abs(dq[..., RHO] / q[..., RHO]), np.abs(dq[..., P] / q[..., P]))
     factor = np.minimum(1.0, _LARGEST_CHANGE / np.maximum(ratio, 1e-300))
-    updated: Array = q + factor[:, None] * dq
+    updated: Array = q + factor[..., None] * dq
     return updated
