@@ -107,6 +107,7 @@ class FiniteVolumeSolver:
         self._pattern = Pattern.of(self.grid)
         self._states: dict[str, SteadyState] = {}
         self._cut = Cut.of(self.grid)
+        self._check_moment_reference()
         self._mesh_key = _mesh_key(mesh)
 
     @property
@@ -351,8 +352,24 @@ class FiniteVolumeSolver:
 
     def _mesh_motion(self, condition: FlightCondition, velocity: Array, rate: Array) -> MeshMotion:
         """V_b and omega in solver units and mesh axes."""
+        if not (np.all(np.isfinite(velocity)) and np.all(np.isfinite(rate))):
+            raise InputError(f"the motion is not finite: velocity {velocity} m/s, rate {rate} rad/s in body axes")
         sound = condition.speed_of_sound
         return MeshMotion(mesh_from_body(velocity) / sound, mesh_from_body(rate) * self._reference.length / sound)
+
+    def _check_moment_reference(self) -> None:
+        """The loads of the whole follow from those of a part only about a point that the planes of symmetry share."""
+        symmetric = [np.arange(p.start, p.stop) for p in self.mesh.patches if p.kind == "symmetry"]
+        for axis in (axis for axis, cut in ((1, self._cut.y), (2, self._cut.z)) if cut):
+            faces = np.concatenate(symmetric)
+            faces = faces[np.abs(self.grid.normal[faces, axis]) > 0.5]
+            centres = self.mesh.face_centre[faces, axis]
+            gap = float(np.max(np.abs(centres - self._reference.moment_reference[axis])))
+            if gap > 1e-6 * self._reference.length:
+                raise InputError(
+                    f"the moment reference point is {gap:.3g} m off the mesh's symmetry plane along {'xyz'[axis]}: "
+                    "about such a point only the full mesh tells the loads"
+                )
 
     def _check_symmetry(self, motion: MeshMotion) -> None:
         """A mirrored half cannot move through its own mirror."""

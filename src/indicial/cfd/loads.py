@@ -56,7 +56,8 @@ class Cut:
     @property
     def factor(self) -> Array:
         """What loads of the part are multiplied with to be those of the whole, shape (6,)."""
-        factor = np.ones(6)
+        # a layer of a plane flow has no lateral loads: its own moments about x and z only tell how thick it is
+        factor = _KEPT_BY_Y.copy() if self.plane else np.ones(6)
         for cut, kept in ((self.y, _KEPT_BY_Y), (self.z, _KEPT_BY_Z)):
             if cut:
                 factor = 2.0 * kept * factor
