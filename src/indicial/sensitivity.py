@@ -30,6 +30,8 @@ class Sensitivities:
         The six coefficients, shape (6,).
     condition : FlightCondition
     reference : ReferenceQuantities
+    plane : bool
+        Whether the flow is two-dimensional: nothing is known then of lateral loads and motions, which have zeros.
     provenance : dict
         How it was made (plain values).
     """
@@ -39,6 +41,7 @@ class Sensitivities:
     baseline: Array
     condition: FlightCondition
     reference: ReferenceQuantities
+    plane: bool = False
     provenance: dict[str, Any] = field(default_factory=dict)
 
     def value(self, output: str, parameter: str) -> float:

@@ -207,3 +207,63 @@ def test_more_memory_than_there_is_is_refused_before_anything_is_solved(monkeypa
         FiniteVolumeSolver(plate().mesh, REFERENCE)
     with pytest.raises(InputError, match="linearised flow on"):
         plate().linearise(CONDITION)
+
+
+def test_betadot_is_made_dimensionless_alike_by_operator_and_adjoint() -> None:
+    """By the lateral length, as p and r are; so with twice that length the derivative is half as large."""
+    from dataclasses import replace
+
+    one = finner("half").reference
+    tables = []
+    for reference in (one, replace(one, lateral_length=2.0 * one.length)):
+        flow = FiniteVolumeSolver(finner("half").mesh, reference)
+        tables.append(operator.derivatives(flow.frequency_response(PITCHED, [0.1], ("beta",))))
+        by_adjoint = adjoint.derivatives(adjoint.run(flow, PITCHED))
+        for name in ("CY_betadot", "Cn_betadot"):
+            assert tables[-1].value(name, k=None) == pytest.approx(by_adjoint.value(name), rel=1e-6)
+    for k in (None, 0.1):
+        assert tables[1].value("CY_betadot", k=k) == pytest.approx(0.5 * tables[0].value("CY_betadot", k=k), rel=1e-6)
+
+
+def test_alphadot_alone_gives_the_derivatives_that_alpha_gives() -> None:
+    alone = operator.derivatives(plate().frequency_response(CONDITION, K, ("alphadot",)))
+    told = operator.derivatives(plate_response())
+    assert alone.names() == ("CA_alphadot", "CN_alphadot", "Cm_alphadot")
+    for k in (None, *K):
+        for name in ("CN_alphadot", "Cm_alphadot"):
+            assert alone.value(name, k=k) == pytest.approx(told.value(name, k=k), rel=1e-6)
+
+
+def test_a_frequency_asked_for_twice_gives_one_record() -> None:
+    found = operator.derivatives(plate().frequency_response(CONDITION, [0.5, 0.1, 0.5], ("alpha",)))
+    assert found.value("CN_alpha", k=0.5) == pytest.approx(
+        operator.derivatives(plate_response()).value("CN_alpha", k=0.5)
+    )
+
+
+def test_a_pitch_oscillation_that_was_not_solved_for_is_refused() -> None:
+    with pytest.raises(InputError, match="not among the reduced frequencies"):
+        operator.pitch_oscillation(plate().frequency_response(CONDITION), "CN", 0.1)
+
+
+def test_solutions_do_not_depend_on_what_was_solved_before() -> None:
+    """Factors of one shift serve others near it, but complex ones no real system."""
+    (flow,) = plate().linearise(CONDITION)
+    (fresh,) = plate().linearise(CONDITION)
+    rhs = flow.b[:, 0]
+    flow.solve(rhs, 1e-5j)
+    real = flow.solve(rhs)
+    assert real.dtype == float
+    assert real == pytest.approx(fresh.solve(rhs), abs=1e-6 * np.max(np.abs(real)))
+    for shift in (0.5, 0.5 + 0.0j):
+        x = flow.solve(rhs, shift)
+        left = rhs - flow.apply(x) - shift * flow.apply_mass(x)
+        assert np.linalg.norm(left) < 2.0 * flow.tolerance * np.linalg.norm(rhs)
+
+
+def test_a_plane_flow_has_no_lateral_derivatives_by_the_adjoint() -> None:
+    found = adjoint.derivatives(adjoint.run(plate(), CONDITION))
+    assert found.value("CN_alpha") == pytest.approx(
+        operator.derivatives(plate_response()).value("CN_alpha", k=None), rel=1e-6
+    )
+    assert not [name for name in found.names() if name.startswith(("CY", "Cl", "Cn"))]

@@ -17,7 +17,7 @@ from indicial.cfd.shapes import Airfoil, FinnedBody
 from indicial.conventions import Array, ReferenceQuantities
 from indicial.errors import NoLimitError
 from indicial.frequency import FrequencyResponse
-from indicial.methods import forced_oscillation, indicial_response, operator
+from indicial.methods import adjoint, forced_oscillation, indicial_response, operator
 from indicial.motion import FlightCondition
 from indicial.rom import StepResponses
 from indicial.rom.inverse import step_responses
@@ -108,3 +108,16 @@ def test_the_lift_of_a_plane_subsonic_flow_has_no_alphadot_derivative() -> None:
     with pytest.raises(NoLimitError, match="no limit"):
         operator.value(found, "CN_alphadot")
     assert "CN_alphadot" not in operator.derivatives(found).select(k=None).names()
+
+
+def test_what_has_no_limit_is_refused_by_the_adjoint_too_and_where_alpha_was_not_asked_for() -> None:
+    flow = solver("airfoil", 24)
+    told = adjoint.run(flow, CONDITIONS["airfoil"])
+    assert adjoint.refusals(told).keys() == operator.refusals(response("airfoil", 24, ())).keys()
+    names = adjoint.derivatives(told).names()
+    assert "CN_alpha" in names
+    assert not set(names) & {"CN_alphadot", "CN_q+CN_alphadot"}
+    alone = flow.frequency_response(CONDITIONS["airfoil"], [0.1], ("alphadot",))
+    with pytest.raises(NoLimitError, match="ask for the input alpha"):
+        operator.value(alone, "CN_alphadot")
+    assert "CN_alphadot" in operator.derivatives(alone).select(k=0.1).names()

@@ -65,6 +65,7 @@ def _labelled(operators: Sequence[FlowOperator], motions: Array, accelerations: 
         baseline=first.baseline,
         condition=condition,
         reference=reference,
+        plane=first.plane,
         provenance={"solver": "linearised finite volumes", "cells": first.size // 5} | asdict(spent),
     )
 

@@ -241,6 +241,8 @@ class FlowOperator:
         DivergenceError
             If the tolerance is not reached: the steady state is not one, or the flow is close to unstable.
         """
+        if complex(shift).imag == 0.0:
+            shift = complex(shift).real  # a real system, of whatever type its shift is
         preconditioner = self._preconditioner(shift)
         mass = shift * self._mass
         letters = "nji,nj->ni" if transposed else "nij,nj->ni"
@@ -255,7 +257,7 @@ class FlowOperator:
         solution = gmres(
             apply,
             preconditioner.solve_transposed if transposed else preconditioner.solve,
-            (rhs if shift == complex(shift).real else rhs.astype(complex)).reshape(-1, 5),
+            (rhs.astype(complex) if isinstance(shift, complex) else rhs).reshape(-1, 5),
             self.tolerance,
             restart=80,
             restarts=6,
@@ -273,7 +275,8 @@ class FlowOperator:
     def _preconditioner(self, shift: complex) -> TwoLevel:
         """The factorisation for a shift, or one for a shift that differs by little beside the cells' own rates."""
         for other, made in self._preconditioners.items():
-            if abs(shift - other) <= SHARED * self._slow_rate:
+            # a real system wants real factors; those serve a complex one as well
+            if abs(shift - other) <= SHARED * self._slow_rate and (np.imag(other) == 0.0 or np.imag(shift) != 0.0):
                 return made
         # beside that of k = 0, which serves all low frequencies, keep the last one only
         for other in [other for other in self._preconditioners if other != 0.0]:

@@ -9,6 +9,7 @@ those of `operator` at k = 0.
 from __future__ import annotations
 
 from indicial.derivatives import Derivative, DerivativeTable
+from indicial.methods.operator import without_limit
 from indicial.motion import FlightCondition, Rates
 from indicial.sensitivity import Sensitivities
 from indicial.solver import AdjointSolver
@@ -23,13 +24,25 @@ def run(solver: AdjointSolver, condition: FlightCondition, rates: Rates = Rates(
 
 
 def derivatives(sensitivities: Sensitivities, source: str = "adjoint") -> DerivativeTable:
-    """The records, method ``adjoint``, longitudinal loads with longitudinal motions and lateral with lateral."""
-    wanted = [(load, motion) for load in ("CA", "CN", "Cm") for motion in LONGITUDINAL]
-    wanted += [(load, motion) for load in ("CY", "Cl", "Cn") for motion in LATERAL]
+    """The records, method ``adjoint``, longitudinal loads with longitudinal motions and lateral with lateral.
+
+    Derivatives without a limit are left out as `operator.derivatives` does, and so are lateral ones of a plane flow.
+    """
     s = sensitivities
+    wanted = [(load, motion) for load in ("CA", "CN", "Cm") for motion in LONGITUDINAL]
+    if not s.plane:
+        wanted += [(load, motion) for load in ("CY", "Cl", "Cn") for motion in LATERAL]
+    refused = refusals(s)
     return DerivativeTable(
         tuple(
             Derivative.at(s.condition, s.reference, f"{load}_{motion}", "adjoint", s.derivative(load, motion), source)
             for load, motion in wanted
+            if f"{load}_{motion}" not in refused
         )
     ).with_sums()
+
+
+def refusals(sensitivities: Sensitivities) -> dict[str, str]:
+    """Derivatives that have no limit as k goes to 0, with the reason; see `operator.refusals`."""
+    slopes = {load: sensitivities.derivative(load, "alpha") for load in ("CA", "CN", "Cm")}
+    return without_limit(slopes) if sensitivities.plane and sensitivities.condition.mach < 1.0 else {}

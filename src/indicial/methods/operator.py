@@ -26,6 +26,7 @@ from indicial.solver import FrequencySolver
 
 LOADS = {
     "alpha": ("CA", "CN", "Cm"),
+    "alphadot": ("CA", "CN", "Cm"),
     "q": ("CA", "CN", "Cm"),
     "beta": ("CY", "Cl", "Cn"),
     "p": ("CY", "Cl", "Cn"),
@@ -60,8 +61,10 @@ def derivatives(response: FrequencyResponse, source: str = "linearised flow") ->
     """
     refused = refusals(response)
     records: list[Derivative] = []
-    for k in (None, *(float(k) for k in response.k if k > 0.0)):
-        for motion in (name for name in response.inputs if name in LOADS):
+    # alpha tells of alphadot too, at no loss
+    motions = [name for name in response.inputs if name != "alphadot" or "alpha" not in response.inputs]
+    for k in (None, *dict.fromkeys(float(k) for k in response.k if k > 0.0)):
+        for motion in motions:
             for load in LOADS[motion]:
                 for name, value in _values(response, load, motion, k).items():
                     if k is not None or name not in refused:
@@ -92,9 +95,17 @@ def refusals(response: FrequencyResponse) -> dict[str, str]:
     not change, such as the moment about the aerodynamic centre, has a limit; what the mesh gives for the others at
     k = 0 shows how far the mesh reaches.
     """
-    if response.condition.mach >= 1.0 or not response.plane or "alpha" not in response.inputs:
+    if response.condition.mach >= 1.0 or not response.plane:
         return {}
-    slopes = {load: response.at_zero(load, "alpha")[0] for load in LOADS["alpha"]}
+    if "alpha" in response.inputs:
+        return without_limit({load: response.at_zero(load, "alpha")[0] for load in LOADS["alpha"]})
+    unknown = "may have no limit as k goes to 0 in two-dimensional subsonic flow: ask for the input alpha, which tells"
+    asked = LOADS["alphadot"] if "alphadot" in response.inputs else ()
+    return {f"{load}_alphadot": f"{load}_alphadot {unknown}" for load in asked}
+
+
+def without_limit(slopes: dict[str, float]) -> dict[str, str]:
+    """The alphadot derivatives that two-dimensional subsonic flow has not, from the loads' alpha derivatives."""
     return {
         f"{load}_alphadot": (
             f"{load}_alphadot has no limit as k goes to 0: the wake of a two-dimensional subsonic flow makes it grow "
@@ -111,8 +122,12 @@ def _values(response: FrequencyResponse, load: str, motion: str, k: float | None
     if k is not None:
         h = complex(response.channel(load, motion)[int(np.flatnonzero(response.k == k)[0])])
         static, slope = h.real, h.imag / k
-    if motion in ("alpha", "beta"):
-        return {f"{load}_{motion}": static, f"{load}_{motion}dot": slope}
+    if motion == "alpha":
+        return {f"{load}_alpha": static, f"{load}_alphadot": slope}
+    if motion == "beta":
+        # the response is in the time 2Vt/c; with the other lateral rates, betadot is made dimensionless by b
+        lengths = response.reference.moment_lengths
+        return {f"{load}_beta": static, f"{load}_betadot": slope * float(lengths[1] / lengths[2])}
     return {f"{load}_{motion}": static}
 
 
@@ -128,9 +143,9 @@ def pitch_oscillation(response: FrequencyResponse, output: str, k: float) -> tup
 
     ``H_a(ik) + ik H_q(ik)``, whose parts Eqs. (3) and (4) call ``C_ja - k^2 C_jqd`` and ``C_jad + C_jq``.
     """
-    place = int(np.argmin(np.abs(response.k - k)))
-    if not math.isclose(float(response.k[place]), k, rel_tol=1e-9) or k <= 0.0:
-        known = ", ".join(f"{value:g}" for value in response.k)
+    place = int(np.argmin(np.abs(response.k - k))) if response.k.size else -1
+    if place < 0 or not math.isclose(float(response.k[place]), k, rel_tol=1e-9) or k <= 0.0:
+        known = ", ".join(f"{value:g}" for value in response.k) or "none"
         raise InputError(f"k = {k:g} is not among the reduced frequencies solved for: {known}")
     h = complex(response.channel(output, "alpha")[place] + 1j * k * response.channel(output, "q")[place])
     return h.real, h.imag / k
