@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from indicial.errors import InputError
 
@@ -44,23 +44,31 @@ def write_netcdf(path: str | Path, data: xarray.Dataset) -> None:
         data.to_netcdf(temporary, engine="h5netcdf")
 
 
-def read_netcdf(path: str | Path, what: str) -> xarray.Dataset:
-    """The whole of a netCDF file that should hold `what`.
+def read_netcdf(path: str | Path, format_: str, version: int) -> xarray.Dataset:
+    """The whole of one of the package's netCDF files, which says in its attributes what it is.
 
     Raises
     ------
     InputError
-        If there is no such file, or it is not netCDF.
+        If there is no such file, it is not netCDF, or it holds something else or another version of it.
     """
     import xarray as xr
 
     if not Path(path).is_file():
-        raise InputError(f"{path}: no such {what}")
+        raise InputError(f"{path}: no such file")
     try:
         with xr.open_dataset(path, engine="h5netcdf") as opened:
-            return opened.load()
+            data: xarray.Dataset = opened.load()
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: not a netCDF file ({error})") from error
+    check_format(path, data.attrs, format_, version)
+    return data
+
+
+def check_format(path: str | Path, attributes: Mapping[Any, Any], format_: str, version: int) -> None:
+    """Raise InputError unless `attributes` name this format and version."""
+    if attributes.get("format") != format_ or int(attributes.get("schema_version", 0)) != version:
+        raise InputError(f"{path}: not a file of {format_}, schema version {version}")
 
 
 def _umask() -> int:

@@ -144,9 +144,7 @@ class FrequencyResponse:
         InputError
             If the file is missing or holds something else.
         """
-        data = read_netcdf(path, "frequency response file")
-        if data.attrs.get("format") != FORMAT or int(data.attrs["schema_version"]) != SCHEMA_VERSION:
-            raise InputError(f"{path}: not an {FORMAT} of schema version {SCHEMA_VERSION}")
+        data = read_netcdf(path, FORMAT, SCHEMA_VERSION)
         return cls(
             k=data["k"].values,
             inputs=tuple(str(name) for name in data["input"].values),

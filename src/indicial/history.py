@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SCHEMA_VERSION = 1
+FORMAT = "indicial history"
 
 
 @dataclass(frozen=True)
@@ -103,7 +104,7 @@ class History:
         data["rate"] = (("time", "axis"), self.rate, {"units": "rad/s", "axes": "body"})
         coords = {"time": ("time", self.time, {"units": "s"}), "axis": ["x", "y", "z"]}
         attrs = {
-            "format": "indicial history",
+            "format": FORMAT,
             "schema_version": SCHEMA_VERSION,
             "condition": json.dumps(asdict(self.condition)),
             "reference": json.dumps(self.reference.to_dict()),
@@ -125,9 +126,7 @@ class History:
         InputError
             If the file is missing or not an indicial history.
         """
-        data = read_netcdf(path, "history file")
-        if data.attrs.get("format") != "indicial history" or int(data.attrs["schema_version"]) != SCHEMA_VERSION:
-            raise InputError(f"{path}: not an indicial history of schema version {SCHEMA_VERSION}")
+        data = read_netcdf(path, FORMAT, SCHEMA_VERSION)
         return cls(
             time=data["time"].values,
             coefficients=np.stack([data[name].values for name in COEFFICIENTS], axis=1),

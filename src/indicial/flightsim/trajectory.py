@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from indicial.conventions import COEFFICIENTS, Array, ReferenceQuantities, flow_angles
 from indicial.errors import InputError
-from indicial.files import read_netcdf, write_netcdf, write_text
+from indicial.files import check_format, read_netcdf, write_netcdf, write_text
 from indicial.flightsim.attitude import euler_angles, matrix_from_quaternion
 
 if TYPE_CHECKING:
@@ -255,7 +255,7 @@ class Trajectory:
         InputError
             If the file is missing or not an indicial trajectory.
         """
-        data = read_netcdf(path, "trajectory file")
+        data = read_netcdf(path, FORMAT, SCHEMA_VERSION)
         header = _checked_header(dict(data.attrs), path)
         names = ("time", *_COLUMNS, "density", "speed_of_sound", "lag", "outside_range")
         values: dict[str, Any] = {name: data[name].values for name in names}
@@ -378,8 +378,7 @@ class Trajectory:
 
 
 def _checked_header(attrs: dict[str, Any], path: str | Path) -> dict[str, Any]:
-    if attrs.get("format") != FORMAT or int(attrs.get("schema_version", 0)) != SCHEMA_VERSION:
-        raise InputError(f"{path}: not an {FORMAT} of schema version {SCHEMA_VERSION}")
+    check_format(path, attrs, FORMAT, SCHEMA_VERSION)
     return {
         "reference": ReferenceQuantities.from_dict(json.loads(attrs["reference"])),
         "lag_names": tuple(json.loads(attrs["lag_names"])),

@@ -163,7 +163,7 @@ class RangeRecord:
         InputError
             If the file is missing or not a range record.
         """
-        data = read_netcdf(path, "range record")
+        data = read_netcdf(path, FORMAT, SCHEMA_VERSION)
         columns = {str(name): data[name].values for name in data.data_vars}
         return cls._from_columns(columns, _checked_header(dict(data.attrs), path, None), path)
 

@@ -262,7 +262,7 @@ class StepResponses:
         InputError
             If the file is missing or holds something else.
         """
-        data = read_dataset(path, FORMAT, SCHEMA_VERSION)
+        data = read_netcdf(path, FORMAT, SCHEMA_VERSION)
 
         def optional(name: str) -> Array | None:
             return data[name].values if name in data else None
@@ -323,11 +323,3 @@ def _averaged(name: str, runs: list[tuple[Array, Array]]) -> StepResponse:
     values = np.stack([unit for _, unit in runs])
     spread = 0.5 * np.ptp(values, axis=0) if len(runs) > 1 else None
     return StepResponse(name, s, values.mean(axis=0), spread=spread)
-
-
-def read_dataset(path: str | Path, format_: str, version: int) -> xarray.Dataset:
-    """Open one of the package's netCDF files, or say what is wrong with it."""
-    data = read_netcdf(path, "file")
-    if data.attrs.get("format") != format_ or int(data.attrs["schema_version"]) != version:
-        raise InputError(f"{path}: not a file of {format_}, schema version {version}")
-    return data

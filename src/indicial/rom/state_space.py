@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 
 from indicial.conventions import COEFFICIENTS, Array, ReferenceQuantities
 from indicial.errors import InputError
-from indicial.files import write_netcdf, write_text
+from indicial.files import read_netcdf, write_netcdf, write_text
 from indicial.motion import FlightCondition
 from indicial.rom.model import ComplexArray, ReducedModel
-from indicial.rom.response import StepResponse, StepResponses, read_dataset
+from indicial.rom.response import StepResponse, StepResponses
 from indicial.rom.signals import MotionInputs
 from indicial.rom.simulation import simulate
 
@@ -270,7 +270,7 @@ class StateSpaceModel(ReducedModel):
     @classmethod
     def from_netcdf(cls, path: str | Path) -> Self:
         """Read a file of `to_netcdf`."""
-        data = read_dataset(path, FORMAT, SCHEMA_VERSION)
+        data = read_netcdf(path, FORMAT, SCHEMA_VERSION)
         matrices = {name.lower(): data[name].values for name in ("A", "B", "C", "D", "baseline")}
         return cls.from_dict({**matrices, **json.loads(data.attrs["description"])})
 
