@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from indicial.cfd.march.continuation import continuation
+from indicial.cfd.march.continuation import Standing, continuation
 from indicial.cfd.march.convergence import ConvergenceHistory, Recorder
 from indicial.errors import DivergenceError, InputError
 
@@ -68,7 +68,7 @@ def solved(
     equations: Powers, start: np.ndarray = ROOT + 1.0, tolerance: float = 1e-12, cfl: float = 10.0, iterations: int = 50
 ) -> tuple[np.ndarray, ConvergenceHistory]:
     record = Recorder()
-    q = continuation(equations, start, scale=1.0, tolerance=tolerance, cfl=cfl, iterations=iterations, record=record)
+    q = continuation(equations, Standing(start, cfl, iterations), scale=1.0, tolerance=tolerance, record=record)
     return q, record.history(equations.floor)
 
 
@@ -135,3 +135,22 @@ def test_no_step_short_enough_and_no_step_left_are_told_apart_and_carry_the_last
 def test_a_start_that_is_not_finite_is_refused() -> None:
     with pytest.raises(InputError, match="not finite"):
         solved(Powers(), start=np.full((CELLS, 5), np.nan))
+
+
+def test_an_iteration_goes_on_from_any_place_it_stood_at_as_if_it_had_never_stopped() -> None:
+    places: list[tuple[Standing, ConvergenceHistory]] = []
+    record, start = Recorder(), Standing(ROOT + 1.0, 10.0, 50)
+    q = continuation(
+        Powers(3),
+        start,
+        scale=1.0,
+        tolerance=1e-12,
+        record=record,
+        keep=lambda at: places.append((at, record.history(0.0))),
+    )
+    assert len(places) > 3
+    for at, history in places:
+        again = Recorder.of(history)
+        assert np.array_equal(continuation(Powers(3), at, scale=1.0, tolerance=1e-12, record=again), q)
+        for name, values in record.history(0.0).to_arrays().items():
+            assert np.array_equal(values, again.history(0.0).to_arrays()[name]), name

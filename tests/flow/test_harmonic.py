@@ -9,7 +9,8 @@ import pytest
 from indicial.cfd import FiniteVolumeSolver, FlowSettings
 from indicial.cfd.flow import STILL_AIR, Grid, Jacobian, MeshMotion, Residual
 from indicial.cfd.flow.gas import conservative_jacobian
-from indicial.cfd.march import Pattern
+from indicial.cfd.march import Pattern, PeriodicState, converge_periodic
+from indicial.cfd.march.checkpoint import Checkpoint
 from indicial.cfd.march.time_spectral import PeriodicResidual, spectral_derivative
 from indicial.cfd.mesh import box_mesh, plate_mesh
 from indicial.conventions import ReferenceQuantities
@@ -176,3 +177,61 @@ def test_a_periodic_flow_that_does_not_converge_says_so_and_keeps_its_states(tmp
     with np.load(kept) as stored:
         assert np.array_equal(stored["q"], states)
     assert np.all(states[..., [0, 4]] > 0.0)
+
+
+@pytest.mark.parametrize("saves", [2, 6], ids=["first-order phase", "second-order phase"])
+def test_a_killed_periodic_solution_goes_on_as_if_it_had_never_stopped(
+    saves: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    solver, motion = plate(8), pitching(np.radians(4.0))
+    unit, phase = CONDITION.speed_of_sound, instants(1)
+    t = motion.period * phase / (2.0 * np.pi)
+    given = [solver._mesh_motion(CONDITION, motion.velocity(now), motion.rate(now)) for now in t]
+    start = np.broadcast_to(STILL_AIR, (solver.grid.n_cells, 5))
+
+    def found(checkpoint: Checkpoint | None) -> PeriodicState:
+        return converge_periodic(
+            Residual(solver.grid), Pattern.of(solver.grid), given, motion.omega / unit, start, checkpoint=checkpoint
+        )
+
+    class Killed(BaseException):
+        pass
+
+    class Mortal(Checkpoint):
+        left = saves
+
+        def save(self, **arrays: np.ndarray) -> None:
+            super().save(**arrays)
+            self.left -= 1
+            if self.left == 0:
+                raise Killed
+
+    whole = found(None)
+    path = tmp_path / "periodic.npz"
+    with pytest.raises(Killed):
+        found(Mortal(path, "this one", interval=0.0))
+    kept = Checkpoint(path, "this one").load()
+    assert kept is not None
+    assert bool(kept["second_order"][-1]) is (saves == 6)
+    resumed = found(Checkpoint(path, "this one"))
+    assert np.array_equal(resumed.q, whole.q)
+    for name, values in whole.history.to_arrays().items():
+        assert np.array_equal(values, resumed.history.to_arrays()[name]), name
+    assert not path.exists()
+
+
+def test_a_periodic_solution_that_fails_leaves_nothing_to_fail_from_again(tmp_path: Path) -> None:
+    saved = []
+
+    class Watched(Checkpoint):
+        def save(self, **arrays: np.ndarray) -> None:
+            super().save(**arrays)
+            saved.append(self.path.exists())
+
+    grid = plate(8).grid
+    checkpoint = Watched(tmp_path / "periodic.npz", "this one", interval=0.0)
+    start = np.broadcast_to(STILL_AIR, (grid.n_cells, 5))
+    with pytest.raises(DivergenceError, match="no more steps"):
+        converge_periodic(Residual(grid), Pattern.of(grid), motions(3), 1.0, start, iterations=1, checkpoint=checkpoint)
+    assert saved == [True]
+    assert not checkpoint.path.exists()

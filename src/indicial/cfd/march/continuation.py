@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -73,29 +74,48 @@ class FlowEquations(Protocol):
         """``q + dq``, shortened where it must be for a state to remain a state."""
 
 
-def continuation(
-    equations: FlowEquations,
-    q: Array,
-    *,
-    scale: float,
-    tolerance: float,
-    cfl: float,
-    iterations: int,
-    record: Recorder,
-    progress: Callable[[float], None] | None = None,
-) -> Array:
-    """Newton steps from q until the norm of F is `tolerance` of `scale`, or what round-off leaves of it.
+@dataclass(frozen=True)
+class Standing:
+    """Where an iteration stands: all that it needs to go on as if it had never stopped.
 
     Parameters
     ----------
+    q : ndarray
+        State or states.
     cfl : float
-        Pseudo-time step to start with, in signal crossings of a cell.
+        Pseudo-time step to go on with, in signal crossings of a cell.
     iterations : int
-        Newton steps allowed, those taken back included.
+        Newton steps allowed from here, those taken back included.
+    first : float, optional
+        Residual that it started from; None at the start itself.
+    """
+
+    q: Array
+    cfl: float
+    iterations: int
+    first: float | None = None
+
+
+def continuation(
+    equations: FlowEquations,
+    start: Standing,
+    *,
+    scale: float,
+    tolerance: float,
+    record: Recorder,
+    progress: Callable[[float], None] | None = None,
+    keep: Callable[[Standing], None] | None = None,
+) -> Array:
+    """Newton steps from a start until the norm of F is `tolerance` of `scale`, or what round-off leaves of it.
+
+    Parameters
+    ----------
     record : Recorder
         Told of every state that the iteration stands on, and of all products with J.
     progress : callable, optional
         Told the fraction done, 0 to 1.
+    keep : callable, optional
+        Told after each step where the iteration stands.
 
     Raises
     ------
@@ -114,11 +134,13 @@ def continuation(
         record.note(norm, cfl, equations.residual.second_order)
         log.debug("residual %.2e, CFL %.1e, %d products", norm, cfl, record.products)
 
+    q, cfl, iterations = start.q, start.cfl, start.iterations
     f, norm = evaluate(q)
     if not np.isfinite(norm):
         raise InputError(f"the {equations.name} solution cannot start: the residual of its first state is not finite")
-    first = max(norm, 10.0 * tolerance)
-    note(norm, 0.0)
+    if start.first is None:
+        note(norm, 0.0)
+    first = norm if start.first is None else start.first
     while norm > max(tolerance, equations.round_off() / scale):
         if iterations == 0 or cfl < _LEAST_CFL:
             raise _failure(equations, q, f, norm, tolerance, cfl, record.steps)
@@ -140,8 +162,11 @@ def continuation(
         cfl *= 1.2 * float(np.clip(norm / norm_trial, 0.3, 8.0)) if solved else 0.3
         cfl = min(cfl, _NEWTON_CFL)
         q, f, norm = trial, f_trial, norm_trial
+        if keep is not None:
+            keep(Standing(q, cfl, iterations, first))
         if progress is not None:
-            progress(float(np.clip(np.log(first / norm) / np.log(first / tolerance), 0.0, 1.0)))
+            whole = np.log(max(first / tolerance, 10.0))
+            progress(float(np.clip(np.log(first / norm) / whole, 0.0, 1.0)))
     return q
 
 

@@ -112,10 +112,22 @@ class Recorder:
         """A state that the iteration stands on."""
         self._entries.append((residual, cfl, self.products, second_order))
 
+    @classmethod
+    def of(cls, history: ConvergenceHistory) -> Self:
+        """One that goes on with what another has written."""
+        columns = (history.residual, history.cfl, history.products, history.second_order)
+        entries = list(zip(*(column.tolist() for column in columns), strict=True))
+        return cls(entries, int(history.products[-1]))
+
     @property
     def steps(self) -> int:
         """Newton steps so far."""
         return sum(cfl > 0.0 for _, cfl, _, _ in self._entries)
+
+    @property
+    def second_order(self) -> bool:
+        """Whether the last phase so far is that of the second-order scheme."""
+        return bool(self._entries) and self._entries[-1][3]
 
     def history(self, round_off: float) -> ConvergenceHistory:
         """All so far."""

@@ -8,17 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
 from indicial.cfd.flow.residual import MeshMotion, Residual
-from indicial.cfd.march.continuation import continuation
+from indicial.cfd.march.checkpoint import Checkpoint
+from indicial.cfd.march.continuation import Standing, continuation
 from indicial.cfd.march.convergence import ConvergenceHistory, Recorder
 from indicial.cfd.march.ilu import Pattern
 from indicial.cfd.march.steady import Progress, limited_update, residual_scale
 from indicial.cfd.march.time_spectral import PeriodicJacobian, PeriodicResidual
 from indicial.conventions import Array
+from indicial.errors import DivergenceError
 
 _NEAR = 1e-2
 """Residual of a start from which the second-order scheme is taken at once."""
@@ -52,6 +55,7 @@ def converge_periodic(
     tolerance: float = 1e-10,
     iterations: int = 200,
     progress: Progress | None = None,
+    checkpoint: Checkpoint | None = None,
 ) -> PeriodicState:
     """The periodic flow under `motions` at the N = 2h + 1 instants of a period ``2 pi / omega``.
 
@@ -65,6 +69,9 @@ def converge_periodic(
         leaves more than that, what it leaves is wanted.
     iterations : int
         Newton steps allowed to each phase.
+    checkpoint : Checkpoint, optional
+        Where the iteration keeps where it stands; one that was killed goes on from there, step by step as if it never
+        had been.
 
     Raises
     ------
@@ -75,30 +82,50 @@ def converge_periodic(
     """
     equations = _PeriodicEquations(PeriodicResidual(residual, motions, omega), pattern)
     scale = float(np.linalg.norm([residual_scale(residual, motion) for motion in motions]))
-    q = np.broadcast_to(start, (len(motions), *start.shape[-2:])).copy()
-    record = Recorder()
-    if float(np.linalg.norm(equations(q))) > _NEAR * scale:
-        plain = Residual(residual.grid, second_order=False, far=residual.far)
-        q = continuation(
-            _PeriodicEquations(PeriodicResidual(plain, motions, omega), pattern),
-            q,
-            scale=scale,
-            tolerance=_NEAR,
-            cfl=_START_CFL,
-            iterations=iterations,
-            record=record,
-        )
-    q = continuation(
-        equations,
-        q,
-        scale=scale,
-        tolerance=tolerance,
-        cfl=_NEARBY_CFL,
-        iterations=iterations,
-        record=record,
-        progress=progress,
-    )
+    kept = _load(checkpoint)
+    if kept is not None:
+        at, record = kept
+        far_off = not record.second_order
+    else:
+        q = np.broadcast_to(start, (len(motions), *start.shape[-2:])).copy()
+        far_off = bool(np.linalg.norm(equations(q)) > _NEAR * scale)
+        at, record = Standing(q, _START_CFL if far_off else _NEARBY_CFL, iterations), Recorder()
+    keep = partial(_save, checkpoint, record) if checkpoint is not None else None
+    try:
+        if far_off:
+            plain = Residual(residual.grid, second_order=False, far=residual.far)
+            first = _PeriodicEquations(PeriodicResidual(plain, motions, omega), pattern)
+            q = continuation(first, at, scale=scale, tolerance=_NEAR, record=record, keep=keep)
+            at = Standing(q, _NEARBY_CFL, iterations)
+        q = continuation(equations, at, scale=scale, tolerance=tolerance, record=record, progress=progress, keep=keep)
+    except DivergenceError:
+        _remove(checkpoint)
+        raise
+    _remove(checkpoint)
     return PeriodicState(q, record.history(equations.round_off() / scale))
+
+
+def _save(checkpoint: Checkpoint, record: Recorder, at: Standing) -> None:
+    """Keep where the iteration stands and how it came there, if it is time to."""
+    checkpoint.save_if_due(
+        q=at.q, standing=np.array([at.cfl, at.iterations, at.first]), **record.history(0.0).to_arrays()
+    )
+
+
+def _load(checkpoint: Checkpoint | None) -> tuple[Standing, Recorder] | None:
+    """What `_save` kept, if anything."""
+    stored = checkpoint.load() if checkpoint is not None else None
+    if stored is None:
+        return None
+    cfl, iterations, first = stored["standing"].tolist()
+    record = Recorder.of(ConvergenceHistory.from_arrays(stored))
+    return Standing(stored["q"], cfl, int(iterations), first), record
+
+
+def _remove(checkpoint: Checkpoint | None) -> None:
+    """The iteration is at its end, good or bad: nothing to go on with."""
+    if checkpoint is not None:
+        checkpoint.remove()
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from indicial.cfd.flow.gas import GAMMA, RHO, STILL_AIR, P, conservative_jacobia
 from indicial.cfd.flow.grid import Grid
 from indicial.cfd.flow.jacobian import Jacobian
 from indicial.cfd.flow.residual import MeshMotion, Residual, gather
-from indicial.cfd.march.continuation import continuation
+from indicial.cfd.march.continuation import Standing, continuation
 from indicial.cfd.march.convergence import ConvergenceHistory, Recorder
 from indicial.cfd.march.ilu import BlockILU, Pattern
 from indicial.conventions import Array
@@ -111,22 +111,18 @@ def converge(
         plain = Residual(residual.grid, second_order=False, far=residual.far)
         q = continuation(
             _SteadyEquations(plain, pattern, motion),
-            np.broadcast_to(residual.far, (residual.grid.n_cells, 5)).copy(),
+            Standing(np.broadcast_to(residual.far, (residual.grid.n_cells, 5)).copy(), _START_CFL, iterations),
             scale=scale,
             tolerance=_FIRST_ORDER_TOLERANCE,
-            cfl=_START_CFL,
-            iterations=iterations,
             record=record,
         )
     else:
         q = start.copy()
     q = continuation(
         _SteadyEquations(residual, pattern, motion),
-        q,
+        Standing(q, _START_CFL if start is None else _NEARBY_CFL, iterations),
         scale=scale,
         tolerance=tolerance,
-        cfl=_START_CFL if start is None else _NEARBY_CFL,
-        iterations=iterations,
         record=record,
         progress=progress,
     )
