@@ -7,6 +7,7 @@ from typing import Any
 
 import typer
 
+from indicial.cli import study as _study  # noqa: F401  (adds its command to the app)
 from indicial.cli.commands import app
 from indicial.errors import IndicialError, InputError
 

@@ -1,0 +1,77 @@
+"""A figure that was asked for: what it must reach, what it came to, and where it is worst."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from indicial.conventions import Array
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One asked figure.
+
+    Parameters
+    ----------
+    name : str
+    value : float or None
+        As a fraction or in the figure's own unit; None where nothing is computed yet.
+    target : float or None
+        Largest value allowed; None for a figure that is only reported.
+    worst : str
+        Where it is worst, in words.
+    note : str
+        What the reader must know of it.
+    """
+
+    name: str
+    value: float | None
+    target: float | None
+    worst: str = ""
+    note: str = ""
+
+    @property
+    def holds(self) -> bool:
+        """Whether the target is reached; a figure that is only reported always holds once it is computed."""
+        return (
+            self.value is not None and math.isfinite(self.value) and (self.target is None or self.value <= self.target)
+        )
+
+    @property
+    def verdict(self) -> str:
+        """In two words at most."""
+        if self.value is None:
+            return "NOT COMPUTED"
+        if self.target is None:
+            return "reported"
+        return "holds" if self.holds else "FALLS SHORT"
+
+    def summary(self) -> str:
+        """One line."""
+        value = "-" if self.value is None else f"{self.value:.2%}"
+        target = "-" if self.target is None else f"{self.target:.0%}"
+        detail = "; ".join(part for part in (self.worst, self.note) if part)
+        return f"{self.name:<62} {value:>8}  at most {target:>4}  {self.verdict:<12}  {detail}".rstrip()
+
+
+def relative_rms(name: str, target: float | None, mach: Sequence[float], found: Array, wanted: Array) -> Claim:
+    """RMS relative deviation of `found` from `wanted` over Mach numbers, its worst point named."""
+    if len(mach) == 0:
+        return Claim(name, None, target)
+    deviation = np.asarray(found) / np.asarray(wanted) - 1.0
+    worst = int(np.argmax(np.abs(deviation)))
+    where = f"worst {deviation[worst]:+.1%} at M {mach[worst]:g} of {len(mach)} points"
+    return Claim(name, float(np.sqrt(np.mean(deviation**2))), target, where)
+
+
+def largest(name: str, target: float | None, mach: Sequence[float], deviation: Array) -> Claim:
+    """Largest of relative deviations over Mach numbers."""
+    if len(mach) == 0:
+        return Claim(name, None, target)
+    size = np.abs(np.asarray(deviation))
+    worst = int(np.argmax(size))
+    return Claim(name, float(size[worst]), target, f"worst at M {mach[worst]:g} of {len(mach)} points")
