@@ -26,6 +26,10 @@ class Claim:
         Where it is worst, in words.
     note : str
         What the reader must know of it.
+    unit : str
+        ``%`` for fractions, else the unit of value and target.
+    complete : bool
+        Whether all points that the figure asks for are computed; if not, it does not hold.
     """
 
     name: str
@@ -33,29 +37,39 @@ class Claim:
     target: float | None
     worst: str = ""
     note: str = ""
+    unit: str = "%"
+    complete: bool = True
 
     @property
     def holds(self) -> bool:
-        """Whether the target is reached; a figure that is only reported always holds once it is computed."""
-        return (
-            self.value is not None and math.isfinite(self.value) and (self.target is None or self.value <= self.target)
-        )
+        """Whether the target is reached; a figure that is only reported holds once it is computed."""
+        if self.value is None or not math.isfinite(self.value) or not self.complete:
+            return False
+        return self.target is None or self.value <= self.target
 
     @property
     def verdict(self) -> str:
         """In two words at most."""
         if self.value is None:
             return "NOT COMPUTED"
-        if self.target is None:
-            return "reported"
-        return "holds" if self.holds else "FALLS SHORT"
+        if not self.complete:
+            return "INCOMPLETE"
+        if not self.holds:
+            return "FALLS SHORT"
+        return "reported" if self.target is None else "holds"
 
     def summary(self) -> str:
         """One line."""
-        value = "-" if self.value is None else f"{self.value:.2%}"
-        target = "-" if self.target is None else f"{self.target:.0%}"
         detail = "; ".join(part for part in (self.worst, self.note) if part)
-        return f"{self.name:<62} {value:>8}  at most {target:>4}  {self.verdict:<12}  {detail}".rstrip()
+        value, target = self._shown(self.value, 2), self._shown(self.target, 0)
+        return f"{self.name:<66} {value:>9}  at most {target:>6}  {self.verdict:<12}  {detail}".rstrip()
+
+    def _shown(self, value: float | None, digits: int) -> str:
+        if value is None:
+            return "-"
+        if self.unit != "%":
+            return f"{value:.{digits}f} {self.unit}"
+        return f"{value:.{digits}%}" if value >= 1e-3 or value == 0.0 else f"{100.0 * value:.0e}%"
 
 
 def relative_rms(name: str, target: float | None, mach: Sequence[float], found: Array, wanted: Array) -> Claim:

@@ -1,4 +1,4 @@
-"""Computing the pieces of a study: those that are missing, one by one or side by side, each kept as soon as it is there."""
+"""Computing the pieces of a study: those that are missing, one by one or side by side, each kept once it is there."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The Basic Finner over its whole Mach range: dynamic derivatives by every method, against the free-flight range data."""
+"""The Basic Finner over its whole Mach range: derivatives by every method, against free-flight range data."""
 
 from indicial.studies.finner.agreement import claims
 from indicial.studies.finner.computing import compute

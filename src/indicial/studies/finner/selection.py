@@ -1,0 +1,105 @@
+"""The results that a figure is read from: at each Mach number the mesh that suits it, and the finest level there is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from indicial.conventions import Array, transfer_longitudinal
+from indicial.errors import InputError
+from indicial.studies.finner.pieces import LEVELS, LOWEST_WITHOUT_WAKE
+from indicial.studies.grid_convergence import GridConvergence, grid_convergence
+from indicial.studies.kept import Results
+from indicial.studies.piece import PieceResult
+
+OTHER_MOMENT_REFERENCE = 6.1
+"""Calibres; the paper's text."""
+
+
+def suitable(results: Results, method: str = "operator") -> Results:
+    """Results of a method on the mesh of their Mach number: to the base plane from M 1.5, with a sting below."""
+    chosen = results.select(method=method)
+    return Results(
+        tuple(r for r in chosen if r.piece.mesh == ("base" if r.piece.mach >= LOWEST_WITHOUT_WAKE else "sting"))
+    )
+
+
+def finest(results: Results, method: str = "operator") -> Results:
+    """The finest of `suitable` at each Mach number, in order of Mach number."""
+    best: dict[float, PieceResult] = {}
+    for level in LEVELS:
+        best |= {r.piece.mach: r for r in suitable(results, method).select(level=level)}
+    return Results(tuple(best[mach] for mach in sorted(best)))
+
+
+def levels_of(results: Results) -> str:
+    """How many points are of which mesh, in words."""
+    counts = {level: len(results.select(level=level)) for level in reversed(LEVELS)}
+    return ", ".join(f"{count} {level}" for level, count in counts.items() if count)
+
+
+def derivative(result: PieceResult, name: str, **wanted: object) -> float:
+    """A derivative of one result; sums are made of their parts unless the method gives them whole."""
+    if "+" in name and not result.derivatives.select(name=name, **wanted).records:
+        return sum(result.derivatives.value(part, **wanted) for part in name.split("+"))
+    return result.derivatives.value(name, **wanted)
+
+
+def about(result: PieceResult, moment_reference: float, k: float | None = None) -> dict[str, float]:
+    """Longitudinal derivatives about another point [calibres from the nose]."""
+    records = {r.name: r for r in result.derivatives.select(k=k)}
+    diameter = next(iter(records.values())).reference_length_m
+    present = next(iter(records.values())).moment_reference_m[0] / diameter
+    return transfer_longitudinal({name: r.value for name, r in records.items()}, moment_reference - present)
+
+
+def convergence(results: Results, mach: float, name: str) -> GridConvergence | None:
+    """Grid convergence of a derivative by the operator at k = 0; None with fewer than two meshes."""
+    found = [r for level in LEVELS if (r := suitable(results).select(level=level).at(mach)) is not None]
+    if len(found) < 2:
+        return None
+    return grid_convergence([derivative(r, name, k=None) for r in found], [int(r.provenance["cells"]) for r in found])
+
+
+def values(results: Results, machs: Array, name: str, **wanted: object) -> list[float]:
+    """A derivative at Mach numbers that must all be there."""
+    out = []
+    for mach in machs:
+        result = results.at(float(mach))
+        if result is None:
+            raise InputError(f"no result at M {mach:g}")
+        out.append(derivative(result, name, **wanted))
+    return out
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two methods at one Mach number on one mesh."""
+
+    mach: float
+    found: float
+    wanted: float
+    scale: float
+
+    @property
+    def deviation(self) -> float:
+        """Difference over the scale."""
+        return (self.found - self.wanted) / abs(self.scale)
+
+
+def pairs(results: Results, method: str, name: str, k: float | None, scale: str | None = None) -> list[Pair]:
+    """A method's derivative against the operator's at the same k, mesh and Mach number.
+
+    Parameters
+    ----------
+    scale : str, optional
+        The operator's derivative that the difference is measured by; that of `name` if not given.
+    """
+    found = []
+    operators = results.select(method="operator")
+    for one in results.select(method=method):
+        base = operators.select(mesh=one.piece.mesh, level=one.piece.level).at(one.piece.mach)
+        if base is None or not one.derivatives.select(name=name).records:
+            continue
+        size = derivative(base, scale or name, k=k)
+        found.append(Pair(one.piece.mach, derivative(one, name), derivative(base, name, k=k), size))
+    return found
