@@ -69,6 +69,29 @@ def test_the_transposed_preconditioner_is_the_transpose_of_the_plain_one(matrix:
 
 
 @KINDS
+@pytest.mark.parametrize("shape", [(1, 1, 1), (4, 3, 3)], ids=["one cell", "many cells"])
+def test_the_sweeps_are_dense_algebra_with_the_rounded_factors(
+    shape: tuple[int, int, int], matrix: type, vector: type
+) -> None:
+    """To double precision: the factors are rounded, the sums are not, so that M^-1 is one linear operator."""
+    grid = Grid.from_mesh(box_mesh(shape, skew="none"), REFERENCE)
+    for pattern in (Pattern.of(grid), Pattern.wide(grid)):
+        n, blocks = grid.n_cells, blocks_on(pattern, matrix)
+        ilu = BlockILU(pattern, blocks)
+        rounded = blocks.astype(np.complex64 if matrix is complex else np.float32).astype(matrix)
+        factors = dense(pattern, rounded).reshape(n, 5, n, 5)
+        lower, upper = np.eye(5 * n, dtype=matrix).reshape(n, 5, n, 5), np.zeros_like(factors)
+        for i in range(n):
+            lower[i, :, :i] = factors[i, :, :i]
+            upper[i, :, i] = np.linalg.inv(factors[i, :, i])
+            upper[i, :, i + 1 :] = factors[i, :, i + 1 :]
+        m = lower.reshape(5 * n, 5 * n) @ upper.reshape(5 * n, 5 * n)
+        b = random((n, 5), vector, seed=2)
+        assert ilu.solve(b).ravel() == pytest.approx(np.linalg.solve(m, b.ravel()), rel=1e-11, abs=1e-13)
+        assert ilu.solve_transposed(b).ravel() == pytest.approx(np.linalg.solve(m.T, b.ravel()), rel=1e-11, abs=1e-13)
+
+
+@KINDS
 @pytest.mark.parametrize("transposed", [False, True], ids=["plain", "transposed"])
 def test_preconditioned_gmres_solves_what_dense_algebra_does(matrix: type, vector: type, transposed: bool) -> None:
     pattern = pattern_of((4, 3, 3))

@@ -7,6 +7,7 @@ shifted by i omega), right-hand sides too.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ import scipy.sparse as sparse
 from numba import njit
 
 from indicial.cfd.flow.grid import Grid
+from indicial.cfd.march import sweeps
 from indicial.cfd.march.krylov import State
 from indicial.conventions import Index
 from indicial.errors import DivergenceError
@@ -146,62 +148,6 @@ def _factorise(blocks, indptr, indices, diagonal):  # type: ignore[no-untyped-de
     return -1
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
-def _solve(blocks, indptr, indices, diagonal, b, x):  # type: ignore[no-untyped-def]
-    """x = U^-1 L^-1 b."""
-    n = indptr.shape[0] - 1
-    for i in range(n):
-        y0, y1, y2, y3, y4 = b[i, 0], b[i, 1], b[i, 2], b[i, 3], b[i, 4]
-        for s in range(indptr[i], diagonal[i]):
-            j = indices[s]
-            for m in range(5):
-                v = x[j, m]
-                y0 -= blocks[s, 0, m] * v
-                y1 -= blocks[s, 1, m] * v
-                y2 -= blocks[s, 2, m] * v
-                y3 -= blocks[s, 3, m] * v
-                y4 -= blocks[s, 4, m] * v
-        x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4] = y0, y1, y2, y3, y4
-    for i in range(n - 1, -1, -1):
-        y0, y1, y2, y3, y4 = x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4]
-        for s in range(diagonal[i] + 1, indptr[i + 1]):
-            j = indices[s]
-            for m in range(5):
-                v = x[j, m]
-                y0 -= blocks[s, 0, m] * v
-                y1 -= blocks[s, 1, m] * v
-                y2 -= blocks[s, 2, m] * v
-                y3 -= blocks[s, 3, m] * v
-                y4 -= blocks[s, 4, m] * v
-        d = blocks[diagonal[i]]
-        for a in range(5):
-            x[i, a] = d[a, 0] * y0 + d[a, 1] * y1 + d[a, 2] * y2 + d[a, 3] * y3 + d[a, 4] * y4
-
-
-@njit(cache=True, error_model="numpy", fastmath=True)
-def _solve_transposed(blocks, indptr, indices, diagonal, x):  # type: ignore[no-untyped-def]
-    """x = L^-T U^-T x in place: rows of the factors are columns of their transposes, so each row is scattered."""
-    n = indptr.shape[0] - 1
-    for i in range(n):
-        y0, y1, y2, y3, y4 = x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4]
-        d = blocks[diagonal[i]]
-        for a in range(5):
-            x[i, a] = d[0, a] * y0 + d[1, a] * y1 + d[2, a] * y2 + d[3, a] * y3 + d[4, a] * y4
-        y0, y1, y2, y3, y4 = x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4]
-        for s in range(diagonal[i] + 1, indptr[i + 1]):
-            j = indices[s]
-            u = blocks[s]
-            for a in range(5):
-                x[j, a] -= u[0, a] * y0 + u[1, a] * y1 + u[2, a] * y2 + u[3, a] * y3 + u[4, a] * y4
-    for i in range(n - 1, -1, -1):
-        y0, y1, y2, y3, y4 = x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4]
-        for s in range(indptr[i], diagonal[i]):
-            j = indices[s]
-            u = blocks[s]
-            for a in range(5):
-                x[j, a] -= u[0, a] * y0 + u[1, a] * y1 + u[2, a] * y2 + u[3, a] * y3 + u[4, a] * y4
-
-
 class BlockILU:
     """``M^-1`` of a block-sparse matrix, real or complex, applied to real or complex states (nc, 5).
 
@@ -222,18 +168,25 @@ class BlockILU:
         row = _factorise(blocks, pattern.indptr, pattern.indices, pattern.diagonal)
         if row >= 0:
             raise DivergenceError(f"the linearised equations of cell {row} are singular", cell=row)
-        self._factors = blocks.astype(np.complex64 if np.iscomplexobj(blocks) else np.float32)
+        self._complex = np.iscomplexobj(blocks)
+        self._lower, self._upper = sweeps.lay_out(blocks, pattern.indptr, pattern.diagonal)
 
     def solve(self, b: State) -> State:
         """``M^-1 b``, complex if M or b is."""
-        x = np.empty(b.shape, dtype=np.result_type(self._factors, b))
-        p = self.pattern
-        _solve(self._factors, p.indptr, p.indices, p.diagonal, b, x)
-        return x
+        return self._swept(b, sweeps.solve_complex if self._complex else sweeps.solve_real)
 
     def solve_transposed(self, b: State) -> State:
         """``M^-T b``: the transpose, nothing conjugated."""
-        x = b.astype(np.result_type(self._factors, b))
+        return self._swept(b, sweeps.solve_transposed_complex if self._complex else sweeps.solve_transposed_real)
+
+    def _swept(self, b: State, sweep: Callable[..., None]) -> State:
+        """What a sweep makes of b; with real factors of its real and imaginary part apart."""
+        if np.iscomplexobj(b) and not self._complex:
+            return self._swept(b.real, sweep) + 1j * self._swept(b.imag, sweep)
+        x = np.empty(len(b) * (16 if self._complex else 8))
+        sweeps.padded(b, x)
         p = self.pattern
-        _solve_transposed(self._factors, p.indptr, p.indices, p.diagonal, x)
-        return x
+        sweep(self._lower, self._upper, p.indptr, p.indices, p.diagonal, x)
+        out = np.empty(b.shape, dtype=complex if self._complex else float)
+        (sweeps.unpadded_complex if self._complex else sweeps.unpadded_real)(x, out)
+        return out
