@@ -103,7 +103,8 @@ def test_the_projected_model_is_kept_and_repeats_steps_and_oscillations_it_was_n
     assert facts["met"]
     assert facts["order"] == projected.order <= fitted.order
     steps = {entry["model"]: entry for entry in results["rom"]["steps"]}
-    assert set(steps) == {"state space", "projected"}
+    as_many = steps.get("state space, as many states", steps["state space"])
+    assert as_many["order"] - projected.order in (0, 1)
     # as good as its error over the band, relative to the peak: the unsteady part is half of these loads
     assert max(channel["rms"] for channel in steps["projected"]["channels"]) < 3.0 * facts["tolerance"]
     worst = [check["worst"] for check in results["rom"]["checks"] if check["model"] == "projected"]

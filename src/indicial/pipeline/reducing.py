@@ -61,7 +61,7 @@ def reduce(context: Context) -> Outcome:
         "realised_by": model.method,
         "fit": [asdict(error) for error in model.errors],
         "checks": checks,
-        "steps": [_against_steps(name, one, responses) for name, one in spaces.items()],
+        "steps": [_against_steps(*each, responses) for each in _with_equal_order(spaces, responses).items()],
         "refused": refused,
         "out_of_phase_at_k": _out_of_phase(model, fom, context.case.forced_oscillation.k),
     }
@@ -116,6 +116,15 @@ def _with_finals(responses: StepResponses, finals: dict[str, dict[str, float]]) 
         for response in responses.responses
     ]
     return replace(responses, responses=tuple(known))
+
+
+def _with_equal_order(spaces: dict[str, StateSpaceModel], responses: StepResponses) -> dict[str, StateSpaceModel]:
+    """The models, and one fitted with as many states as the projected one (or one more), where that is another."""
+    projected = spaces.get("projected")
+    each = 0 if projected is None else math.ceil(projected.order / len(responses.inputs))
+    if each * len(responses.inputs) in (0, spaces["state space"].order):
+        return spaces
+    return {**spaces, "state space, as many states": realise(responses, order=each)}
 
 
 def _against_steps(name: str, model: StateSpaceModel, responses: StepResponses) -> dict[str, Any]:

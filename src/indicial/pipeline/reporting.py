@@ -298,7 +298,11 @@ def _step_errors(results: dict[str, Any]) -> Grid:
         for entry in steps
     ]
     headings = ["model", *(f"{output} to {cause}" for output, cause in channels)]
-    return Grid(headings, cells, "Error of the step response, rms relative to its unsteady part; the fit has seen it")
+    return Grid(
+        headings,
+        cells,
+        "Error of the step response, rms relative to its unsteady part; the state-space fits have seen it",
+    )
 
 
 def _models(context: Context, results: dict[str, Any], rows: list[ComparisonRow]) -> Chapter:
