@@ -301,7 +301,7 @@ def _step_errors(results: dict[str, Any]) -> Grid:
     return Grid(
         headings,
         cells,
-        "Error of the step response, rms relative to its unsteady part; the state-space fits have seen it",
+        "Error of the step response, rms of its unsteady part; the fits have seen it",
     )
 
 
