@@ -11,7 +11,7 @@ from indicial.cfd.flow import STILL_AIR, Grid, Jacobian, MeshMotion, Residual
 from indicial.cfd.flow.gas import conservative_jacobian
 from indicial.cfd.march import Pattern, PeriodicState, converge_periodic
 from indicial.cfd.march.checkpoint import Checkpoint
-from indicial.cfd.march.time_spectral import PeriodicResidual, spectral_derivative
+from indicial.cfd.march.time_spectral import PeriodicResidual, resample, spectral_derivative
 from indicial.cfd.mesh import box_mesh, plate_mesh
 from indicial.conventions import ReferenceQuantities
 from indicial.errors import DivergenceError, InputError
@@ -58,6 +58,18 @@ def test_the_spectral_derivative_is_exact_for_the_harmonics_that_it_resolves(har
     slopes = -np.sin(np.outer(phase, n)) @ (n * a) + np.cos(np.outer(phase, n)) @ (n * b)
     assert d @ values == pytest.approx(slopes, abs=1e-12 * harmonics**2)
     assert d == pytest.approx(-d.T, abs=1e-15)
+
+
+@pytest.mark.parametrize("harmonics", [1, 2, 5])
+def test_resampling_is_exact_upwards_and_leaves_out_the_higher_harmonics_downwards(harmonics: int) -> None:
+    n = np.arange(3)
+    a, b = np.random.default_rng(2).standard_normal((2, n.size, 4))
+
+    def series(h: int, kept: int) -> np.ndarray:
+        phases = np.outer(instants(h), n[: kept + 1])
+        return np.cos(phases) @ a[: kept + 1] + np.sin(phases) @ b[: kept + 1]
+
+    assert resample(series(2, 2), harmonics) == pytest.approx(series(harmonics, min(harmonics, 2)), abs=1e-14)
 
 
 @pytest.mark.parametrize("harmonics", [0, -1, 1.5, np.nan, np.inf])
@@ -235,3 +247,32 @@ def test_a_periodic_solution_that_fails_leaves_nothing_to_fail_from_again(tmp_pa
         converge_periodic(Residual(grid), Pattern.of(grid), motions(3), 1.0, start, iterations=1, checkpoint=checkpoint)
     assert saved == [True]
     assert not checkpoint.path.exists()
+
+
+def test_a_flow_of_fewer_harmonics_starts_one_of_more_nearer_and_to_the_same_end() -> None:
+    solver, motion = plate(8), pitching(np.radians(1.0))
+    given = {}
+    for h in (1, 2):
+        times = motion.period * instants(h) / (2.0 * np.pi)
+        given[h] = [solver._mesh_motion(CONDITION, motion.velocity(t), motion.rate(t)) for t in times]
+    residual, pattern, omega = Residual(solver.grid), Pattern.of(solver.grid), motion.omega / CONDITION.speed_of_sound
+    steady = solver._state(CONDITION, CONDITION.velocity, np.zeros(3)).q
+    one = converge_periodic(residual, pattern, given[1], omega, steady)
+    direct = converge_periodic(residual, pattern, given[2], omega, steady)
+    stepped = converge_periodic(residual, pattern, given[2], omega, one.q)
+    assert stepped.q == pytest.approx(direct.q, abs=1e-8)
+    assert np.all(stepped.history.second_order)
+    assert stepped.history.residual[0] < 0.2 * direct.history.residual[direct.history.second_order][0]
+    again = converge_periodic(residual, pattern, given[2], omega, direct.q)
+    assert again.history.steps <= 1
+
+
+def test_a_start_at_instants_that_make_no_flow_is_refused() -> None:
+    grid = plate(8).grid
+    residual, pattern = Residual(grid), Pattern.of(grid)
+    still = np.broadcast_to(STILL_AIR, (3, grid.n_cells, 5)).copy()
+    with pytest.raises(InputError, match="2 instants"):
+        converge_periodic(residual, pattern, motions(5), 1.0, still[:2])
+    still[1, 0, 0] *= 10.0
+    with pytest.raises(InputError, match="positive density"):
+        converge_periodic(residual, pattern, motions(5), 1.0, still)

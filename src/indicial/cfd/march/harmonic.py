@@ -1,7 +1,7 @@
 """Periodic flows: the time-spectral equations solved for all instants together, by the continuation of steady states.
 
-An oscillation of a few degrees is taken straight to the second-order scheme from the steady state at its mean; what
-starts further off goes through the first-order one.
+One state to start from goes through the first-order scheme unless it is near the solution; the flow that fewer
+harmonics gave is interpolated in time and taken straight into the second-order scheme.
 """
 
 from __future__ import annotations
@@ -13,15 +13,16 @@ from typing import ClassVar
 
 import numpy as np
 
+from indicial.cfd.flow.gas import RHO, P
 from indicial.cfd.flow.residual import MeshMotion, Residual
 from indicial.cfd.march.checkpoint import Checkpoint
 from indicial.cfd.march.continuation import Standing, continuation
 from indicial.cfd.march.convergence import ConvergenceHistory, Recorder
 from indicial.cfd.march.ilu import Pattern
 from indicial.cfd.march.steady import Progress, limited_update, residual_scale
-from indicial.cfd.march.time_spectral import PeriodicJacobian, PeriodicResidual
+from indicial.cfd.march.time_spectral import PeriodicJacobian, PeriodicResidual, resample
 from indicial.conventions import Array
-from indicial.errors import DivergenceError
+from indicial.errors import DivergenceError, InputError
 
 _NEAR = 1e-2
 """Residual of a start from which the second-order scheme is taken at once."""
@@ -62,8 +63,9 @@ def converge_periodic(
     Parameters
     ----------
     start : ndarray
-        A state to start from: one for all instants (nc, 5), or one for each (N, nc, 5). Far from the solution it is
-        taken through the first-order scheme, as in an impulsive start.
+        One state (nc, 5), which far from the solution is taken through the first-order scheme, as in an impulsive
+        start; or the flow that fewer or as many harmonics gave, at its own instants (2m + 1, nc, 5), which is
+        interpolated in time and taken straight into the second-order scheme.
     tolerance : float
         Wanted fall of the coupled residual, relative to that of still air under the same motion. Where round-off
         leaves more than that, what it leaves is wanted.
@@ -76,7 +78,8 @@ def converge_periodic(
     Raises
     ------
     InputError
-        If N is even or less than 3.
+        If N is even or less than 3, or `start` is at an even number of instants or has, between them, a density or
+        pressure that is not positive.
     DivergenceError
         If it is not reached; its `state` holds the last states (N, nc, 5).
     """
@@ -87,8 +90,8 @@ def converge_periodic(
         at, record = kept
         far_off = not record.second_order
     else:
-        q = np.broadcast_to(start, (len(motions), *start.shape[-2:])).copy()
-        far_off = bool(np.linalg.norm(equations(q)) > _NEAR * scale)
+        q = _at_instants(start, len(motions))
+        far_off = start.ndim == 2 and bool(np.linalg.norm(equations(q)) > _NEAR * scale)
         at, record = Standing(q, _START_CFL if far_off else _NEARBY_CFL, iterations), Recorder()
     keep = partial(_save, checkpoint, record) if checkpoint is not None else None
     try:
@@ -103,6 +106,21 @@ def converge_periodic(
         raise
     _remove(checkpoint)
     return PeriodicState(q, record.history(equations.round_off() / scale))
+
+
+def _at_instants(start: Array, count: int) -> Array:
+    """States at `count` instants from one state, or from those at the instants of another number of harmonics."""
+    if start.ndim == 2:
+        return np.broadcast_to(start, (count, *start.shape)).copy()
+    if len(start) % 2 == 0:
+        raise InputError(f"a periodic start at {len(start)} instants: their number must be odd")
+    q = resample(start, count // 2)
+    if not np.all(q[..., [RHO, P]] > 0.0):
+        raise InputError(
+            f"the start at {len(start)} instants has no positive density and pressure between them: "
+            "start from one state, or from more harmonics"
+        )
+    return q
 
 
 def _save(checkpoint: Checkpoint, record: Recorder, at: Standing) -> None:

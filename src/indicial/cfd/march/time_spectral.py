@@ -39,6 +39,17 @@ def spectral_derivative(harmonics: int) -> Array:
     return d
 
 
+def resample(values: Array, harmonics: int) -> Array:
+    """The trigonometric polynomial through values at N = 2m + 1 instants, (N, ...), at the 2h + 1 instants of another.
+
+    With fewer harmonics than it has, of what is left of it without its higher ones.
+    """
+    count, wanted = len(values), instants(harmonics).size
+    spectrum = np.fft.rfft(values, axis=0)[: harmonics + 1]
+    resampled: Array = np.fft.irfft(spectrum, wanted, axis=0) * (wanted / count)
+    return resampled
+
+
 class PeriodicResidual:
     """``F_n = V omega sum_m D_nm W(q_m) + R(q_n; motion_n)`` and its linearisation.
 
