@@ -133,3 +133,17 @@ def plus_sums(_typing: Any, s: Any, a: Any, b: Any, c: Any, d: Any, e: Any) -> A
         return builder.fadd(s, folded(abcd, e, [0, 1, 2, 3, 8, 9, 10, 11], [4, 5, 6, 7, 12, 13, 14, 15]))
 
     return _LANES(*[_LANES] * 6), code
+
+
+@_intrinsic
+def fetch(_typing: Any, array: Any, index: Any) -> Any:
+    """Ask the memory for ``array[index]``, to be read soon; any index is allowed."""
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        byte = builder.bitcast(_place(context, builder, array, *arguments), ir.IntType(8).as_pointer())
+        kind = ir.FunctionType(ir.VoidType(), [byte.type, _INT, _INT, _INT])
+        prefetch = builder.module.declare_intrinsic("llvm.prefetch", [byte.type], kind)
+        builder.call(prefetch, [byte, _INT(0), _INT(3), _INT(1)])
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp), code

@@ -18,25 +18,30 @@ from numba import njit
 
 from indicial.cfd.flow.compiled import POINTWISE
 from indicial.cfd.march.krylov import State
-from indicial.cfd.march.lanes import LANES, every, load, minus_product, plus_product, plus_sums, store, zero
+from indicial.cfd.march.lanes import LANES, every, fetch, load, minus_product, plus_product, plus_sums, store, zero
 from indicial.conventions import Index
 
 _BLOCK = 25
+_AHEAD = 1200
+"""How far before the place being read, in numbers, a backward sweep asks for what it will read."""
 _BEYOND_THE_LAST = LANES - 5
 
 
 @njit(**POINTWISE)
 def _write(entries, first, last, out, p):  # type: ignore[no-untyped-def]
     """Write the blocks of some slots from place p on."""
+    # of slices, whose indices the compiler knows not to be negative: a tenth of the time
+    run = entries[_BLOCK * first : _BLOCK * last]
     if np.iscomplexobj(entries):
-        for s in range(first, last):
+        place = out[p : p + 2 * run.size]
+        for s in range(last - first):
             for k in range(_BLOCK):
-                out[p + k] = entries[_BLOCK * s + k].real
-                out[p + _BLOCK + k] = entries[_BLOCK * s + k].imag
-            p += 2 * _BLOCK
+                place[2 * _BLOCK * s + k] = run[_BLOCK * s + k].real
+                place[2 * _BLOCK * s + _BLOCK + k] = run[_BLOCK * s + k].imag
     else:
-        for k in range(_BLOCK * (last - first)):
-            out[p + k] = entries[_BLOCK * first + k].real
+        place = out[p : p + run.size]
+        for k in range(run.size):
+            place[k] = run[k].real
 
 
 @njit(cache=True, error_model="numpy")
@@ -59,6 +64,13 @@ def lay_out(blocks: State, indptr: Index, diagonal: Index) -> tuple[State, State
     upper = np.zeros((len(blocks) - below) * size + _BEYOND_THE_LAST, np.float32)
     _lay_out(blocks.ravel(), indptr, diagonal, lower, upper)
     return lower, upper
+
+
+@njit(**POINTWISE)
+def _fetch(f, p, count):  # type: ignore[no-untyped-def]
+    """Ask the memory for some numbers from place p on, by lines of sixteen: backwards it does not run ahead itself."""
+    for k in range(0, count, 16):
+        fetch(f, p + k)
 
 
 @njit(**POINTWISE)
@@ -192,6 +204,7 @@ def solve_transposed_real(lower, upper, indptr, indices, diagonal, x):  # type: 
         for s in range(diagonal[i] + 1, indptr[i + 1]):
             first += 25
             j = indices[s]
+            _fetch(upper, first - _AHEAD, 25)
             store(x, 8 * j, _minus_transposed(load(x, 8 * j), upper, first, y))
     p = lower.shape[0] - _BEYOND_THE_LAST
     for i in range(n - 1, -1, -1):
@@ -200,6 +213,7 @@ def solve_transposed_real(lower, upper, indptr, indices, diagonal, x):  # type: 
         first = p
         for s in range(indptr[i], diagonal[i]):
             j = indices[s]
+            _fetch(lower, first - _AHEAD, 25)
             store(x, 8 * j, _minus_transposed(load(x, 8 * j), lower, first, y))
             first += 25
 
@@ -221,6 +235,7 @@ def solve_transposed_complex(lower, upper, indptr, indices, diagonal, x):  # typ
         for s in range(diagonal[i] + 1, indptr[i + 1]):
             first += 50
             u, v = load(x, 16 * indices[s]), load(x, 16 * indices[s] + 8)
+            _fetch(upper, first - _AHEAD, 50)
             u = _plus_transposed(_minus_transposed(u, upper, first, re), upper, first + 25, im)
             v = _minus_transposed(_minus_transposed(v, upper, first, im), upper, first + 25, re)
             store(x, 16 * indices[s], u)
@@ -232,6 +247,7 @@ def solve_transposed_complex(lower, upper, indptr, indices, diagonal, x):  # typ
         first = p
         for s in range(indptr[i], diagonal[i]):
             u, v = load(x, 16 * indices[s]), load(x, 16 * indices[s] + 8)
+            _fetch(lower, first - _AHEAD, 50)
             u = _plus_transposed(_minus_transposed(u, lower, first, re), lower, first + 25, im)
             v = _minus_transposed(_minus_transposed(v, lower, first, im), lower, first + 25, re)
             store(x, 16 * indices[s], u)
