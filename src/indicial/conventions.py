@@ -69,6 +69,10 @@ class ReferenceQuantities:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
                 raise InputError(f"reference {name} is {value}, must be positive and finite")
+        if self.lateral_length is not None and not (math.isfinite(self.lateral_length) and self.lateral_length > 0.0):
+            raise InputError(f"reference lateral_length is {self.lateral_length}, must be positive and finite")
+        if not all(math.isfinite(value) for value in self.moment_reference):
+            raise InputError(f"moment reference is {self.moment_reference}, must be finite")
         if self.rate_normalisation not in ("c/2V", "c/V"):
             raise InputError(f"rate_normalisation is {self.rate_normalisation!r}, must be 'c/2V' or 'c/V'")
 
@@ -160,7 +164,8 @@ def transfer_longitudinal(
 
     ``Cm_a' = Cm_a + D CN_a``, ``CN_q' = CN_q - f D CN_a``,
     ``Cm_q' = Cm_q + D CN_q - f D Cm_a - f D^2 CN_a``, ``Cm_ad' = Cm_ad + D CN_ad`` with f = 2 for rates
-    per ``c/2V`` and 1 for ``c/V``; CN_a and CN_ad do not change.
+    per ``c/2V`` and 1 for ``c/V``; CN_a and CN_ad do not change. Exact at alpha = 0: at incidence C_a stands where
+    the derivative with respect to the velocity across the body, ``V dC/dw``, belongs.
 
     Parameters
     ----------

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -69,6 +72,17 @@ def check_format(path: str | Path, attributes: Mapping[Any, Any], format_: str, 
     """Raise InputError unless `attributes` name this format and version."""
     if attributes.get("format") != format_ or int(attributes.get("schema_version", 0)) != version:
         raise InputError(f"{path}: not a file of {format_}, schema version {version}")
+
+
+@cache
+def sources_digest(package: str) -> str:
+    """A name for the source code of a package, so that results of other code than today's are not taken for its own."""
+    root = Path(str(resources.files(package)))
+    digest = hashlib.sha256()
+    for path in sorted(root.rglob("*.py")):
+        digest.update(path.relative_to(root).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
 
 
 def _umask() -> int:

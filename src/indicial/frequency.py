@@ -3,6 +3,7 @@ r"""Labelled frequency responses of loads to motion, and their netCDF files."""
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -24,6 +25,9 @@ FORMAT = "indicial frequency response"
 
 INPUTS = ("alpha", "alphadot", "q", "beta", "p", "r")
 """Motions from which loads respond: alpha and beta by translation [rad]; ``alphadot c/2V, q c/2V, p b/2V, r b/2V``."""
+
+_NO_LIFT = 1e-3
+"""Largest static derivative, relative to CN_alpha, of a load that is counted as one which the wake does not change."""
 
 
 def reduced_frequencies(k: ArrayLike) -> Array:
@@ -198,3 +202,32 @@ def check_inputs(inputs: tuple[str, ...]) -> None:
             raise InputError(f"no input {name!r}; there are {', '.join(INPUTS)}")
     if len(set(inputs)) != len(inputs):
         raise InputError(f"an input comes twice: {', '.join(inputs)}")
+
+
+def without_limit(condition: FlightCondition, plane: bool, slopes: Mapping[str, float]) -> dict[str, str]:
+    """Derivatives with respect to alphadot that have no limit as k goes to 0, with the reason.
+
+    In two-dimensional subsonic flow the vortices shed into the wake induce a downwash that dies out as 1/s. When it
+    has become even over the section it acts as a change of alpha, so each load lags in proportion to its own static
+    derivative, the integral (17) of the lag grows like log s and ``Im H(ik)/k`` like log k. Only a load that alpha does
+    not change, such as the moment about the aerodynamic centre, has a limit; what a mesh gives for the others at
+    k = 0 shows how far the mesh reaches.
+
+    Parameters
+    ----------
+    condition : FlightCondition
+    plane : bool
+        Whether the flow is two-dimensional.
+    slopes : mapping
+        Static derivatives with respect to alpha by load, CN among them.
+    """
+    if condition.mach >= 1.0 or not plane:
+        return {}
+    return {
+        f"{load}_alphadot": (
+            f"{load}_alphadot has no limit as k goes to 0: the wake of a two-dimensional subsonic flow makes it grow "
+            f"like log k, as {load}_alpha = {slope:.3g} is not zero; ask for values at reduced frequencies above 0"
+        )
+        for load, slope in slopes.items()
+        if abs(slope) > _NO_LIFT * abs(slopes["CN"])
+    }

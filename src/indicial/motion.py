@@ -47,6 +47,9 @@ class FlightCondition:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
                 raise InputError(f"{name} is {value}, must be positive and finite")
+        for name in ("alpha", "beta"):
+            if not math.isfinite(getattr(self, name)):
+                raise InputError(f"{name} is {getattr(self, name)}, must be finite")
 
     @property
     def density(self) -> float:
@@ -81,6 +84,11 @@ class Rates:
     p: float = 0.0
     q: float = 0.0
     r: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("p", "q", "r"):
+            if not math.isfinite(getattr(self, name)):
+                raise InputError(f"rate {name} is {getattr(self, name)} rad/s, must be finite")
 
     def as_array(self) -> Array:
         """Shape (3,)."""

@@ -111,6 +111,8 @@ class LinearisedFlow(Protocol):
         Of alpha, beta [rad] and ``q c/2V, p b/2V, r b/2V``.
     outputs : tuple of str
         Of the six coefficients.
+    plane : bool
+        Whether the flow is two-dimensional.
     b, c, d : ndarray
         Real, shapes (n, n_inputs), (n_outputs, n), (n_outputs, n_inputs); n unknowns.
     """
@@ -129,6 +131,9 @@ class LinearisedFlow(Protocol):
 
     @property
     def outputs(self) -> tuple[str, ...]: ...
+
+    @property
+    def plane(self) -> bool: ...
 
     @property
     def b(self) -> Array: ...

@@ -27,6 +27,7 @@ class DenseFlow:
     outputs: tuple[str, ...] = OUTPUTS
     condition: FlightCondition = CONDITION
     reference: ReferenceQuantities = REFERENCE
+    plane: bool = False
     noise: float = 0.0  # relative error of every solution, as an iterative solver leaves it
 
     @property

@@ -18,6 +18,7 @@ from indicial.rom import Projection, StateSpaceModel, StepResponse, StepResponse
 from indicial.rom.reduction import Reduced, impose, nest
 from indicial.rom.snapshots import Snapshots, residual_norms
 from indicial.solver import LinearisedFlow, Solver
+from rom.cases import CONDITION
 from rom.linearised import DenseFlow, known_flow, pipe, random_flow
 
 
@@ -306,3 +307,9 @@ def test_imposed_values_are_met_with_the_poles_kept_or_refused() -> None:
     np.testing.assert_array_equal(imposed.a, model.a)
     few = np.eye(9, 3)
     assert impose(model.within(few, few), static, rate) is None
+
+
+def test_a_plane_subsonic_flow_passes_on_what_it_has_no_limit_of() -> None:
+    flow = replace(known_flow(), plane=True, condition=replace(CONDITION, mach=0.5))
+    assert "CN_alphadot" in project(flow, 1.0).model.refusals()
+    assert not project(known_flow(), 1.0).model.refusals()

@@ -30,6 +30,7 @@ from indicial.cfd.mesh import Mesh
 from indicial.cfd.operator import ANTISYMMETRIC, SYMMETRIC, FlowOperator
 from indicial.conventions import Array, ReferenceQuantities, mesh_from_body
 from indicial.errors import DivergenceError, InputError
+from indicial.files import sources_digest
 from indicial.frequency import INPUTS, FrequencyResponse, reduced_frequencies
 from indicial.history import History
 from indicial.motion import FlightCondition, Motion, Rates, SteadyMotion
@@ -467,7 +468,7 @@ class FiniteVolumeSolver:
         """A name for a computation on this mesh."""
         digest = hashlib.sha256(self._mesh_key.encode())
         digest.update(repr(sorted(self._reference.to_dict().items())).encode())
-        digest.update(__version__.encode())
+        digest.update(sources_digest("indicial.cfd").encode())
         for part in parts:
             if isinstance(part, np.ndarray):
                 digest.update(np.ascontiguousarray(part).tobytes())

@@ -9,7 +9,7 @@ those of `operator` at k = 0.
 from __future__ import annotations
 
 from indicial.derivatives import Derivative, DerivativeTable
-from indicial.methods.operator import without_limit
+from indicial.frequency import without_limit
 from indicial.motion import FlightCondition, Rates
 from indicial.sensitivity import Sensitivities
 from indicial.solver import AdjointSolver
@@ -45,4 +45,4 @@ def derivatives(sensitivities: Sensitivities, source: str = "adjoint") -> Deriva
 def refusals(sensitivities: Sensitivities) -> dict[str, str]:
     """Derivatives that have no limit as k goes to 0, with the reason; see `operator.refusals`."""
     slopes = {load: sensitivities.derivative(load, "alpha") for load in ("CA", "CN", "Cm")}
-    return without_limit(slopes) if sensitivities.plane and sensitivities.condition.mach < 1.0 else {}
+    return without_limit(sensitivities.condition, sensitivities.plane, slopes)

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from indicial.derivatives import Derivative, DerivativeTable
 from indicial.errors import InputError, NoLimitError
-from indicial.frequency import FrequencyResponse, reduced_frequencies
+from indicial.frequency import FrequencyResponse, reduced_frequencies, without_limit
 from indicial.motion import FlightCondition
 from indicial.solver import FrequencySolver
 
@@ -33,9 +33,6 @@ LOADS = {
     "r": ("CY", "Cl", "Cn"),
 }
 """The loads read for each input: longitudinal with longitudinal, lateral with lateral."""
-
-_NO_LIFT = 1e-3
-"""Largest static derivative, relative to CN_alpha, of a load that is counted as one which the wake does not change."""
 
 
 def run(
@@ -87,33 +84,15 @@ def value(response: FrequencyResponse, name: str) -> float:
 
 
 def refusals(response: FrequencyResponse) -> dict[str, str]:
-    """Derivatives that have no limit as k goes to 0, with the reason.
-
-    In two-dimensional subsonic flow the vortices shed into the wake induce a downwash that dies out as 1/s. When it
-    has become even over the section it acts as a change of alpha, so each load lags in proportion to its own static
-    derivative, the integral (17) of the lag grows like log s and ``Im H(ik)/k`` like log k. Only a load that alpha does
-    not change, such as the moment about the aerodynamic centre, has a limit; what the mesh gives for the others at
-    k = 0 shows how far the mesh reaches.
-    """
+    """Derivatives that have no limit as k goes to 0, with the reason: see `indicial.frequency.without_limit`."""
+    if "alpha" in response.inputs:
+        slopes = {load: response.at_zero(load, "alpha")[0] for load in LOADS["alpha"]}
+        return without_limit(response.condition, response.plane, slopes)
     if response.condition.mach >= 1.0 or not response.plane:
         return {}
-    if "alpha" in response.inputs:
-        return without_limit({load: response.at_zero(load, "alpha")[0] for load in LOADS["alpha"]})
     unknown = "may have no limit as k goes to 0 in two-dimensional subsonic flow: ask for the input alpha, which tells"
     asked = LOADS["alphadot"] if "alphadot" in response.inputs else ()
     return {f"{load}_alphadot": f"{load}_alphadot {unknown}" for load in asked}
-
-
-def without_limit(slopes: dict[str, float]) -> dict[str, str]:
-    """The alphadot derivatives that two-dimensional subsonic flow has not, from the loads' alpha derivatives."""
-    return {
-        f"{load}_alphadot": (
-            f"{load}_alphadot has no limit as k goes to 0: the wake of a two-dimensional subsonic flow makes it grow "
-            f"like log k, as {load}_alpha = {slope:.3g} is not zero; ask for values at reduced frequencies above 0"
-        )
-        for load, slope in slopes.items()
-        if abs(slope) > _NO_LIFT * abs(slopes["CN"])
-    }
 
 
 def _values(response: FrequencyResponse, load: str, motion: str, k: float | None) -> dict[str, float]:

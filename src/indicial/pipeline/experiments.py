@@ -17,10 +17,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, runtime_checkab
 
 import numpy as np
 
-from indicial import __version__
 from indicial.conventions import Array
 from indicial.errors import InputError
-from indicial.files import write_text
+from indicial.files import sources_digest, write_text
 from indicial.motion import FlightCondition, Motion, Rates, SteadyMotion
 from indicial.rom import Projection, StateSpaceModel, project
 from indicial.solver import FrequencySolver, LinearisedFlow, Solver
@@ -72,7 +71,7 @@ class Experiment(ABC):
 
     def key(self, factory_key: str) -> str:
         """Another one for every other result."""
-        parts = (__version__, factory_key, type(self).__name__, *self.depends_on())
+        parts = (sources_digest("indicial.cfd"), factory_key, type(self).__name__, *self.depends_on())
         return hashlib.sha256(repr(parts).encode()).hexdigest()
 
     def file_name(self, key: str) -> str:

@@ -19,6 +19,7 @@ import numpy as np
 
 from indicial.conventions import Array
 from indicial.errors import DivergenceError, InputError
+from indicial.frequency import without_limit
 from indicial.rom.interpolation import Interpolation, Unseen
 from indicial.rom.model import ComplexArray
 from indicial.rom.reduction import Reduced, impose
@@ -297,6 +298,7 @@ def _result(
         reference=flow.reference,
         method="projection",
         errors=_channel_errors(basis, reduced, estimate),
+        refused=_refused(flow, basis.static),
     )
     held_out = []
     for point in unseen:
@@ -317,6 +319,14 @@ def _result(
         forward_solves=basis.forward.solves,
         adjoint_solves=basis.adjoint.solves,
     )
+
+
+def _refused(flow: LinearisedFlow, static: Array) -> dict[str, str]:
+    """Derivatives that the flow has not, though every model has."""
+    if "alpha" not in flow.inputs or "CN" not in flow.outputs:
+        return {}
+    slopes = dict(zip(flow.outputs, static[:, flow.inputs.index("alpha")].tolist(), strict=True))
+    return without_limit(flow.condition, flow.plane, slopes)
 
 
 def _channel_errors(basis: Interpolation, reduced: Reduced, estimate: Array) -> tuple[ChannelError, ...]:
