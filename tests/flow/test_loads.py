@@ -57,7 +57,7 @@ def test_a_plane_flow_has_no_lateral_loads() -> None:
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_a_motion_that_is_not_finite_is_refused(bad: float) -> None:
-    with pytest.raises(InputError, match="not finite"):
+    with pytest.raises(InputError, match="must be finite"):
         layer().steady(CONDITION, Rates(q=bad))
     with pytest.raises((InputError, ValueError)):
         layer().steady(FlightCondition(2.0, alpha=bad))
