@@ -71,7 +71,7 @@ def _paper(axes: Axes, figure: int, series: str, label: str, style: str) -> None
 
 
 def _marched(axes: Axes, results: Results, method: str, name: str, label: str, marker: str, colour: str) -> None:
-    found = [r for r in suitable(results, method) if r.derivatives.select(name=name).records]
+    found = [r for r in finest(results, method) if r.derivatives.select(name=name).records]
     if found:
         value = [derivative(r, name) for r in found]
         axes.plot([r.piece.mach for r in found], value, marker, color=colour, fillstyle="none", label=label)

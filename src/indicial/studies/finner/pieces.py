@@ -31,6 +31,9 @@ SUPERSONIC = tuple(sorted((*BETWEEN_SUPERSONIC, *(mach for mach in FLIGHTS if ma
 FIVE = (1.293, 1.5, 2.0, 2.718, 4.0)
 """Mach numbers of the time marches."""
 
+MARCHED = ("quick", "coarse")
+"""Levels of the mesh on which the methods are set against each other."""
+
 AMPLITUDES = {"pitch_deg": 0.05, "alpha_step_deg": 0.02, "q_step": 2e-4}
 """Small, so that what the marches find is linear and can be held against the operator."""
 
@@ -58,26 +61,30 @@ def _kind(mach: float) -> str:
     return "base" if mach >= LOWEST_WITHOUT_WAKE else "sting"
 
 
-def _moving_frame() -> list[Piece]:
+def _moving_frame(level: str) -> list[Piece]:
     machs = (1.077, 1.2, 1.293, 1.5, 2.0, 2.718, 4.0)
     settings = {"moment_reference": FINNER_MOMENT_REFERENCE}
-    return [Piece("mrf", _kind(mach), "coarse", mach, settings) for mach in machs]
+    return [Piece("mrf", _kind(mach), level, mach, settings) for mach in machs]
 
 
-def _marches() -> list[Piece]:
+def _marches(level: str) -> list[Piece]:
     listed = []
     for mach in FIVE:
         forced = {**FORCED, "moment_reference": FINNER_MOMENT_REFERENCE}
         listed += [
-            Piece(f"fom_{motion}", _kind(mach), "coarse", mach, {**forced, "motion": motion})
+            Piece(f"fom_{motion}", _kind(mach), level, mach, {**forced, "motion": motion})
             for motion in ("pitch", "pitch_rate", "plunge")
         ]
         # a supersonic response is over when the slowest wave has left; near M 1 that takes far longer
         end = 160.0 if mach < 1.4 else 80.0
         step = {**STEP, "end": end, "largest": 0.5, "moment_reference": FINNER_MOMENT_REFERENCE}
-        listed.append(Piece("irm", _kind(mach), "coarse", mach, step))
+        listed.append(Piece("irm", _kind(mach), level, mach, step))
     return listed
 
 
-PIECES: tuple[Piece, ...] = (*_sweep(), *_directly_about(6.1), *_moving_frame(), *_marches())
+PIECES: tuple[Piece, ...] = (
+    *_sweep(),
+    *_directly_about(6.1),
+    *(piece for level in MARCHED for piece in (*_moving_frame(level), *_marches(level))),
+)
 """All of them."""
