@@ -163,8 +163,7 @@ def _meshes(results: Results) -> list[Claim]:
         worst = max((c.index / abs(c.value) for c in judged), default=0.0)
         note = f"asymptotic at {settled} of {len(judged)}; largest grid-convergence index {worst:.1%}"
         listed.append(_with(claim, note, complete=len(high) == len(SUPERSONIC)))
-    listed.append(_kinds(results))
-    return listed
+    return [*listed, _kinds(results), _domains(results)]
 
 
 def _levels_at(results: Results, mach: float) -> int:
@@ -183,6 +182,13 @@ def _kinds(results: Results) -> Claim:
                 deviations.append(derivative(both[0], SUM, k=None) / derivative(both[1], SUM, k=None) - 1.0)
                 break
     return largest("damping sum: mesh with a sting against mesh without a wake", None, machs, np.array(deviations))
+
+
+def _domains(results: Results) -> Claim:
+    """Cm_alphadot in a domain twice as wide, about its jump near M 1.2."""
+    found = pairs(results, "operator", "Cm_alphadot", None, "Cm_q", mesh="sting_wide", against="sting")
+    title = "Cm_alphadot: domain twice as wide, about M 1.2, of Cm_q"
+    return largest(title, None, [one.mach for one in found], np.array([one.deviation for one in found]))
 
 
 def _cost(results: Results) -> list[Claim]:

@@ -9,7 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from indicial.cfd import FiniteVolumeSolver
-from indicial.cfd.mesh import Mesh, finned_body_mesh
+from indicial.cfd.mesh import Mesh, WideDomain, finned_body_mesh
 from indicial.cfd.shapes import FinnedBody
 from indicial.errors import InputError
 from indicial.reference_data import FINNER_DIAMETER
@@ -18,10 +18,18 @@ from indicial.studies.study import Progress
 FINENESS = {
     "base": {"quick": 1.0, "coarse": 1.5, "medium": 2.25},
     "sting": {"quick": 0.7, "coarse": 1.0, "medium": 1.5},
+    "sting_wide": {"quick": 0.7},
 }
 """Cells along each direction relative to the quick preset of `finned_body_mesh`."""
 
-NAMES = {"base": "half body to the base plane", "sting": "half body with a sting, wide domain"}
+DOMAINS = {"sting": WideDomain(), "sting_wide": WideDomain(40.0, 40.0, 60.0)}
+"""Of the meshes with a sting; the second is twice as large every way, with the same cells where both are."""
+
+NAMES = {
+    "base": "half body to the base plane",
+    "sting": "half body with a sting, wide domain",
+    "sting_wide": "half body with a sting, domain twice as wide",
+}
 
 FINNER = FinnedBody.basic_finner(FINNER_DIAMETER)
 
@@ -31,18 +39,17 @@ def finner_mesh(kind: str, level: str, mach: float) -> Mesh:
 
     Parameters
     ----------
-    kind : {"base", "sting"}
+    kind : {"base", "sting", "sting_wide"}
     level : {"quick", "coarse", "medium"}
     mach : float
         The mesh to the base plane follows the bow shock of this Mach number; the one with a sting is for all.
     """
     if kind not in FINENESS or level not in FINENESS[kind]:
-        raise InputError(
-            f"no mesh {kind!r} of level {level!r}; kinds are base and sting, levels {', '.join(FINENESS['base'])}"
-        )
+        known = "; ".join(f"{name}: {', '.join(levels)}" for name, levels in FINENESS.items())
+        raise InputError(f"no mesh {kind!r} of level {level!r}; there are {known}")
     if kind == "base":
         return finned_body_mesh(FINNER, FINENESS[kind][level], mach=mach)
-    return finned_body_mesh(FINNER, FINENESS[kind][level], wake="sting")
+    return finned_body_mesh(FINNER, FINENESS[kind][level], wake="sting", domain=DOMAINS[kind])
 
 
 class Relay:

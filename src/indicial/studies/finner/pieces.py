@@ -19,6 +19,9 @@ BETWEEN_TRANSONIC = (1.05, 1.1, 1.12, 1.14, 1.16, 1.18, 1.2, 1.22, 1.24, 1.26, 1
 
 BETWEEN_SUPERSONIC = (1.5, 1.6, 1.7, 2.0, 2.2, 2.5, 3.0, 3.5, 4.0, 4.5)
 
+JUMP = (1.12, 1.14, 1.16, 1.18, 1.2)
+"""Where the jump is computed in a second domain."""
+
 OVERLAP = (1.5, 2.0)
 """Where both kinds of mesh are computed."""
 
@@ -57,6 +60,12 @@ def _directly_about(moment_reference: float) -> list[Piece]:
     return [Piece("operator_about_6.1d", "base", "quick", 2.0, settings)]
 
 
+def _wider() -> list[Piece]:
+    """About the jump in Cm_alphadot, in a domain twice as wide."""
+    settings = {"k": list(REDUCED_FREQUENCIES), "moment_reference": FINNER_MOMENT_REFERENCE}
+    return [Piece("operator", "sting_wide", "quick", mach, settings) for mach in JUMP]
+
+
 def _kind(mach: float) -> str:
     return "base" if mach >= LOWEST_WITHOUT_WAKE else "sting"
 
@@ -85,6 +94,7 @@ def _marches(level: str) -> list[Piece]:
 PIECES: tuple[Piece, ...] = (
     *_sweep(),
     *_directly_about(6.1),
+    *_wider(),
     *(piece for level in MARCHED for piece in (*_moving_frame(level), *_marches(level))),
 )
 """All of them."""

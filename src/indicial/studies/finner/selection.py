@@ -86,20 +86,35 @@ class Pair:
         return (self.found - self.wanted) / abs(self.scale)
 
 
-def pairs(results: Results, method: str, name: str, k: float | None, scale: str | None = None) -> list[Pair]:
-    """A method's derivative against the operator's at the same k, mesh and Mach number.
+def pairs(
+    results: Results,
+    method: str,
+    name: str,
+    k: float | None,
+    scale: str | None = None,
+    *,
+    mesh: str | None = None,
+    against: str | None = None,
+) -> list[Pair]:
+    """A method's derivative against the operator's at the same k, level and Mach number.
 
     Parameters
     ----------
     scale : str, optional
         The operator's derivative that the difference is measured by; that of `name` if not given.
+    mesh, against : str, optional
+        Results on one kind of mesh against the operator on another; the same kind if not given.
     """
     found = []
     operators = results.select(method="operator")
-    for one in results.select(method=method):
-        base = operators.select(mesh=one.piece.mesh, level=one.piece.level).at(one.piece.mach)
+    for one in results.select(method=method) if mesh is None else results.select(method=method, mesh=mesh):
+        kind = one.piece.mesh if against is None else against
+        base = operators.select(mesh=kind, level=one.piece.level).at(one.piece.mach)
+        # a method may refuse a derivative that has no limit
         if base is None or not one.derivatives.select(name=name).records:
             continue
+        # an operator's table has records at several k, those of the other methods at one
+        wanted = {"k": k} if method == "operator" else {}
         size = derivative(base, scale or name, k=k)
-        found.append(Pair(one.piece.mach, derivative(one, name), derivative(base, name, k=k), size))
+        found.append(Pair(one.piece.mach, derivative(one, name, **wanted), derivative(base, name, k=k), size))
     return found
