@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -276,3 +277,32 @@ def test_a_start_at_instants_that_make_no_flow_is_refused() -> None:
     still[1, 0, 0] *= 10.0
     with pytest.raises(InputError, match="positive density"):
         converge_periodic(residual, pattern, motions(5), 1.0, still)
+
+
+def test_a_killed_solver_resumes_its_periodic_flow_from_its_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A save is due at every look at the clock, as if each Newton step took a minute."""
+    clock = iter(range(0, 10**6, 60))
+    monkeypatch.setattr("indicial.cfd.march.checkpoint.time", SimpleNamespace(monotonic=lambda: next(clock)))
+    motion = pitching(np.radians(1.0))
+    whole = plate(8).periodic(CONDITION, motion, motion.period)
+
+    class Killed(BaseException):
+        pass
+
+    plate(8, tmp_path).steady(CONDITION)
+    solver, told = plate(8, tmp_path), []
+
+    def kill(fraction: float) -> None:
+        told.append(fraction)
+        if len(told) == 3:
+            raise Killed
+
+    solver._progress = kill
+    with pytest.raises(Killed):
+        solver.periodic(CONDITION, motion, motion.period)
+    [kept] = tmp_path.glob("periodic-*.npz")
+    resumed = plate(8, tmp_path).periodic(CONDITION, motion, motion.period)
+    assert np.array_equal(resumed.coefficients, whole.coefficients)
+    assert not kept.exists()

@@ -226,6 +226,8 @@ class FiniteVolumeSolver:
             self._check_symmetry(one)
         start = self._state(condition, condition.velocity, np.zeros(3))
         unit = condition.speed_of_sound / self._reference.length
+        key = self._key(condition, velocity, rate, period, self.settings.steady_tolerance)
+        checkpoint = None if self._folder is None else Checkpoint(self._folder / f"periodic-{key}.npz", key)
         try:
             found = converge_periodic(
                 self._residual,
@@ -236,9 +238,10 @@ class FiniteVolumeSolver:
                 tolerance=self.settings.steady_tolerance,
                 iterations=self.settings.steady_iterations,
                 progress=self._progress,
+                checkpoint=checkpoint,
             )
         except DivergenceError as error:
-            kept = self._keep_diverged(error, self._key(condition, velocity, rate, period))
+            kept = self._keep_diverged(error, key)
             message = f"{error}; {self._place(error)}{kept}"
             raise DivergenceError(message, cell=error.cell, state=error.state) from error
         loads = np.empty((t.size, 2, 3))
