@@ -202,11 +202,12 @@ def test_a_flow_that_has_not_converged_is_not_linearised() -> None:
 
 
 def test_more_memory_than_there_is_is_refused_before_anything_is_solved(monkeypatch: pytest.MonkeyPatch) -> None:
+    solver = plate()
     monkeypatch.setattr("indicial.cfd.memory.psutil.virtual_memory", lambda: SimpleNamespace(available=10**6))
     with pytest.raises(InputError, match=r"GB of memory, 0\.0 GB are available"):
         FiniteVolumeSolver(plate().mesh, REFERENCE)
     with pytest.raises(InputError, match="linearised flow on"):
-        plate().linearise(CONDITION)
+        solver.linearise(CONDITION)
 
 
 def test_betadot_is_made_dimensionless_alike_by_operator_and_adjoint() -> None:

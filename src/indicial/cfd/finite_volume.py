@@ -2,9 +2,8 @@ r"""The finite-volume solver behind the solver protocol: motion in, history out.
 
 from __future__ import annotations
 
-import hashlib
 import logging
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +11,15 @@ from numpy.typing import ArrayLike
 
 from indicial import __version__
 from indicial.cfd.adjoint import sensitivities
+from indicial.cfd.checks import check_moment_reference, check_outflow, check_symmetry
 from indicial.cfd.field import FlowField
-from indicial.cfd.flow.gas import GAMMA, P
-from indicial.cfd.flow.grid import OUTFLOW, SYMMETRY, Grid
+from indicial.cfd.flow.gas import GAMMA
+from indicial.cfd.flow.grid import Grid
 from indicial.cfd.flow.jacobian import Jacobian
 from indicial.cfd.flow.residual import MeshMotion, Residual
 from indicial.cfd.frequency_sweep import frequency_response
+from indicial.cfd.kept_states import KeptStates
 from indicial.cfd.loads import AMBIENT_PRESSURE, Cut, coefficients
-from indicial.cfd.march.checkpoint import Checkpoint
 from indicial.cfd.march.convergence import ConvergenceHistory
 from indicial.cfd.march.harmonic import converge_periodic
 from indicial.cfd.march.ilu import Pattern
@@ -30,7 +30,6 @@ from indicial.cfd.mesh import Mesh
 from indicial.cfd.operator import ANTISYMMETRIC, SYMMETRIC, FlowOperator
 from indicial.conventions import Array, ReferenceQuantities, mesh_from_body
 from indicial.errors import DivergenceError, InputError
-from indicial.files import sources_digest
 from indicial.frequency import INPUTS, FrequencyResponse, reduced_frequencies
 from indicial.history import History
 from indicial.motion import FlightCondition, Motion, Rates, SteadyMotion
@@ -100,16 +99,14 @@ class FiniteVolumeSolver:
         self.mesh = mesh
         self.settings = settings if settings is not None else FlowSettings()
         self._reference = reference
-        self._folder = folder
         self._progress = progress
         self.grid = Grid.from_mesh(mesh, reference)
         require(steady_bytes(self.grid), f"the flow on {mesh.n_cells} cells")
         self._residual = Residual(self.grid)
         self._pattern = Pattern.of(self.grid)
-        self._states: dict[str, SteadyState] = {}
         self._cut = Cut.of(self.grid)
-        self._check_moment_reference()
-        self._mesh_key = _mesh_key(mesh)
+        check_moment_reference(mesh, self.grid, self._cut, reference)
+        self._kept = KeptStates(mesh, reference, folder)
 
     @property
     def reference(self) -> ReferenceQuantities:
@@ -161,15 +158,13 @@ class FiniteVolumeSolver:
             return self._mesh_motion(condition, motion.velocity(time / unit), motion.rate(time / unit))
 
         for m in np.unique(np.linspace(0, t.size - 1, 50).astype(int)):
-            self._check_symmetry(motion_at(float(t[m] * unit)))
+            check_symmetry(self.grid, motion_at(float(t[m] * unit)))
         start = self._state(condition, motion.velocity_before, motion.rate_before)
         self._residual(start.q, start.motion)
         initial = self._coefficients(*self._residual.forces(AMBIENT_PRESSURE), condition)
-        checkpoint = None
-        if self._folder is not None:
-            start_of = (motion.velocity_before, motion.rate_before, self.settings.steady_tolerance)
-            key = self._key(condition, *start_of, velocity, rate, t, self.settings.unsteady_tolerance)
-            checkpoint = Checkpoint(self._folder / f"march-{key}.npz", key)
+        start_of = (motion.velocity_before, motion.rate_before, self.settings.steady_tolerance)
+        key = self._kept.key(condition, *start_of, velocity, rate, t, self.settings.unsteady_tolerance)
+        checkpoint = self._kept.checkpoint("march", key)
         try:
             result = march(
                 self._residual,
@@ -196,7 +191,7 @@ class FiniteVolumeSolver:
             provenance={
                 "solver": "finite volume, Euler, second order",
                 "version": __version__,
-                "mesh": self._mesh_key,
+                "mesh": self._kept.mesh_key,
                 "cells": self.grid.n_cells,
                 "jacobian_products": result.products,
                 "newton_steps": result.newton_steps,
@@ -223,11 +218,11 @@ class FiniteVolumeSolver:
         velocity, rate = motion.velocity(t), motion.rate(t)
         motions = [self._mesh_motion(condition, v, w) for v, w in zip(velocity, rate, strict=True)]
         for one in motions:
-            self._check_symmetry(one)
+            check_symmetry(self.grid, one)
         start = self._state(condition, condition.velocity, np.zeros(3))
         unit = condition.speed_of_sound / self._reference.length
-        key = self._key(condition, velocity, rate, period, self.settings.steady_tolerance)
-        checkpoint = None if self._folder is None else Checkpoint(self._folder / f"periodic-{key}.npz", key)
+        key = self._kept.key(condition, velocity, rate, period, self.settings.steady_tolerance)
+        checkpoint = self._kept.checkpoint("periodic", key)
         try:
             found = converge_periodic(
                 self._residual,
@@ -241,7 +236,7 @@ class FiniteVolumeSolver:
                 checkpoint=checkpoint,
             )
         except DivergenceError as error:
-            kept = self._keep_diverged(error, key)
+            kept = self._kept.keep_diverged(error, key)
             message = f"{error}; {self._place(error)}{kept}"
             raise DivergenceError(message, cell=error.cell, state=error.state) from error
         loads = np.empty((t.size, 2, 3))
@@ -261,7 +256,7 @@ class FiniteVolumeSolver:
             provenance={
                 "solver": "finite volume, Euler, second order, time-spectral",
                 "version": __version__,
-                "mesh": self._mesh_key,
+                "mesh": self._kept.mesh_key,
                 "cells": self.grid.n_cells,
                 "harmonics": int(harmonics),
                 "jacobian_products": int(found.history.products[-1]),
@@ -361,47 +356,19 @@ class FiniteVolumeSolver:
         sound = condition.speed_of_sound
         return MeshMotion(mesh_from_body(velocity) / sound, mesh_from_body(rate) * self._reference.length / sound)
 
-    def _check_moment_reference(self) -> None:
-        """The loads of the whole follow from those of a part only about a point that the planes of symmetry share."""
-        symmetric = [np.arange(p.start, p.stop) for p in self.mesh.patches if p.kind == "symmetry"]
-        for axis in (axis for axis, cut in ((1, self._cut.y), (2, self._cut.z)) if cut):
-            faces = np.concatenate(symmetric)
-            faces = faces[np.abs(self.grid.normal[faces, axis]) > 0.5]
-            centres = self.mesh.face_centre[faces, axis]
-            gap = float(np.max(np.abs(centres - self._reference.moment_reference[axis])))
-            if gap > 1e-6 * self._reference.length:
-                raise InputError(
-                    f"the moment reference point is {gap:.3g} m off the mesh's symmetry plane along {'xyz'[axis]}: "
-                    "about such a point only the full mesh tells the loads"
-                )
-
-    def _check_symmetry(self, motion: MeshMotion) -> None:
-        """A mirrored half cannot move through its own mirror."""
-        g = self.grid
-        faces = g.n_interior + np.flatnonzero(g.kind == SYMMETRY)
-        through = g.normal[faces] @ motion.velocity + (g.moment[faces] @ motion.omega) / g.area[faces]
-        if faces.size and np.max(np.abs(through)) > 1e-9:
-            raise InputError("the motion crosses the mesh's symmetry plane: p, r and beta need the full mesh")
-
     def _state(self, condition: FlightCondition, velocity: Array, rate: Array) -> SteadyState:
         """The steady state under a constant motion, from memory, from the folder, or computed."""
         if condition.gamma != GAMMA:
             raise InputError(f"gamma is {condition.gamma}, the finite-volume solver has {GAMMA}")
         motion = self._mesh_motion(condition, velocity, rate)
-        self._check_symmetry(motion)
-        key = self._key(motion.velocity, motion.omega, self.settings.steady_tolerance)
-        if key not in self._states:
-            stored = self._stored(key)
-            checkpoint = stored.load() if stored is not None else None
-            if checkpoint is not None:
-                found = SteadyState(checkpoint["q"], motion, ConvergenceHistory.from_arrays(checkpoint))
-            else:
-                found = self._converged(motion, key)
-                self._check_outflow(found)
-                if stored is not None:
-                    stored.save(q=found.q, **found.history.to_arrays())
-            self._states[key] = found
-        return self._states[key]
+        check_symmetry(self.grid, motion)
+        key = self._kept.key(motion.velocity, motion.omega, self.settings.steady_tolerance)
+        found = self._kept.find(key, motion)
+        if found is None:
+            found = self._converged(motion, key)
+            check_outflow(self.grid, found)
+            self._kept.keep(key, found)
+        return found
 
     def _converged(self, motion: MeshMotion, key: str) -> SteadyState:
         """Compute a steady state; one that fails leaves its last good state in the folder."""
@@ -410,76 +377,27 @@ class FiniteVolumeSolver:
                 self._residual,
                 self._pattern,
                 motion,
-                self._nearest(motion),
+                self._kept.nearest(motion),
                 tolerance=self.settings.steady_tolerance,
                 iterations=self.settings.steady_iterations,
                 progress=self._progress,
             )
         except DivergenceError as error:
-            raise DivergenceError(f"{error}; {self._place(error)}{self._keep_diverged(error, key)}") from error
-
-    def _keep_diverged(self, error: DivergenceError, key: str) -> str:
-        """Put the last good state of a failed computation into the folder; the words that say so."""
-        if self._folder is None or error.state is None:
-            return ""
-        path = self._folder / f"diverged-{key}.npz"
-        Checkpoint(path, key).save(q=np.asarray(error.state))
-        return f"; the last good state is in {path}"
-
-    def _check_outflow(self, state: SteadyState) -> None:
-        """All that leaves by an outflow patch must leave faster than sound: nothing is said there of what is behind."""
-        g = self.grid
-        faces = g.n_interior + np.flatnonzero(g.kind == OUTFLOW)
-        q = state.q[g.owner[faces]]
-        through = g.normal[faces] @ state.motion.velocity + (g.moment[faces] @ state.motion.omega) / g.area[faces]
-        mach = (np.sum(q[:, 1:4] * g.normal[faces], axis=1) - through) / np.sqrt(GAMMA * q[:, P] / q[:, 0])
-        slow = int(np.sum(mach < 1.0))
-        if slow:
-            raise InputError(
-                f"{slow} of {faces.size} outflow faces are not crossed at supersonic speed (least Mach number "
-                f"{np.min(mach):.2f}): use a higher Mach number, or a mesh that goes on downstream"
-            )
+            raise DivergenceError(f"{error}; {self._place(error)}{self._kept.keep_diverged(error, key)}") from error
 
     def _place(self, error: DivergenceError) -> str:
         """Where it went wrong, in mesh coordinates."""
         x, y, z = self.mesh.cell_centre[error.cell or 0]
         return f"worst at x = {x:.4g}, y = {y:.4g}, z = {z:.4g} m"
 
-    def _stored(self, key: str) -> Checkpoint | None:
-        return None if self._folder is None else Checkpoint(self._folder / f"steady-{key}.npz", key)
-
     def start_from(self, condition: FlightCondition, rates: Rates = Rates()) -> None:
         """Have the steady state of a condition at hand, so that later ones start near it."""
         motion = SteadyMotion(condition, rates)
         self._state(condition, motion.velocity(0.0), motion.rate(0.0))
 
-    def _nearest(self, motion: MeshMotion) -> Array | None:
-        """The known state of the closest motion, if it is close enough for Newton's iteration."""
-
-        def distance(state: SteadyState) -> float:
-            change = np.linalg.norm(state.motion.velocity - motion.velocity)
-            return float((change + np.linalg.norm(state.motion.omega - motion.omega)) / np.linalg.norm(motion.velocity))
-
-        known = sorted(self._states.values(), key=distance)
-        return known[0].q if known and distance(known[0]) < 0.1 else None
-
     def _coefficients(self, force: Array, moment: Array, condition: FlightCondition) -> Array:
         """The six coefficients of the whole body, shape (..., 6), from loads in solver units and mesh axes."""
         return coefficients(force, moment, self._cut, condition, self._reference)
-
-    def _key(self, *parts: object) -> str:
-        """A name for a computation on this mesh."""
-        digest = hashlib.sha256(self._mesh_key.encode())
-        digest.update(repr(sorted(self._reference.to_dict().items())).encode())
-        digest.update(sources_digest("indicial.cfd").encode())
-        for part in parts:
-            if isinstance(part, np.ndarray):
-                digest.update(np.ascontiguousarray(part).tobytes())
-            elif isinstance(part, FlightCondition):
-                digest.update(repr(asdict(part)).encode())
-            else:
-                digest.update(repr(part).encode())
-        return digest.hexdigest()[:20]
 
 
 def _within_period(motion: Motion, period: float, phase: Array) -> Array:
@@ -492,11 +410,3 @@ def _within_period(motion: Motion, period: float, phase: Array) -> Array:
         if np.max(np.abs(later - now)) > 1e-9 * np.max(np.abs(now)):
             raise InputError(f"the motion does not repeat itself after a period of {period:.6g} s")
     return t
-
-
-def _mesh_key(mesh: Mesh) -> str:
-    """A name for a mesh: its points, which cells its faces part, and what its patches are."""
-    digest = hashlib.sha256(repr(mesh.patches).encode())
-    for array in (mesh.points, mesh.owner, mesh.neighbour):
-        digest.update(np.ascontiguousarray(array).tobytes())
-    return digest.hexdigest()[:16]
