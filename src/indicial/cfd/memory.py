@@ -7,8 +7,9 @@ import psutil
 from indicial.cfd.flow.grid import Grid
 from indicial.errors import InputError
 
-_DERIVATIVES, _FACE_WORK = 25 + 25 + 5 + 40, 5 + 10
-"""Numbers a face: two 5x5 blocks, the swept slope and the slopes of the reconstruction; fluxes and sensitivities."""
+_DERIVATIVES, _FACE_WORK = 25 + 25 + 5 + 40 + 14, 5 + 10
+"""Numbers a face: two 5x5 blocks, the swept slope, the slopes of the reconstruction and the geometry in blocks; fluxes
+and sensitivities."""
 
 _BLOCK, _STATE, _GRADIENT = 25, 5, 15
 _REAL, _COMPLEX = 8, 16
