@@ -3,7 +3,7 @@ r"""Labelled frequency responses of loads to motion, and their netCDF files."""
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -26,6 +26,12 @@ FORMAT = "indicial frequency response"
 INPUTS = ("alpha", "alphadot", "q", "beta", "p", "r")
 """Motions from which loads respond: alpha and beta by translation [rad]; ``alphadot c/2V, q c/2V, p b/2V, r b/2V``."""
 
+LATERAL = ("beta", "p", "r")
+"""Those of `INPUTS` that are antisymmetric about the plane y = 0."""
+
+_NO_RESPONSE = 1e-6
+"""Largest response, relative to the largest there is, of a load that is shown as one that does not respond."""
+
 _NO_LIFT = 1e-3
 """Largest static derivative, relative to CN_alpha, of a load that is counted as one which the wake does not change."""
 
@@ -36,9 +42,12 @@ def reduced_frequencies(k: ArrayLike) -> Array:
     Raises
     ------
     InputError
-        If one is negative or not finite.
+        If one is negative, not finite or no number.
     """
-    values = np.atleast_1d(np.asarray(k, dtype=float))
+    try:
+        values = np.atleast_1d(np.asarray(k, dtype=float))
+    except (TypeError, ValueError):
+        raise InputError(f"reduced frequencies are {k!r}, must be numbers, finite and at least 0") from None
     if values.ndim != 1:
         raise InputError(f"reduced frequencies must be a list, not an array of shape {values.shape}")
     for value in values:
@@ -161,42 +170,65 @@ class FrequencyResponse:
         )
 
     def summary(self) -> str:
-        """Static values and slopes at k = 0 of the loads that respond."""
+        """Static values and slopes at k = 0 of the loads that respond; "no limit" in place of a slope that has none."""
         lines = [
             f"frequency response at M {self.condition.mach:g} from {', '.join(self.inputs)}, "
             f"{len(self.k)} reduced frequencies" + (f" {self.k[0]:g} to {self.k[-1]:g}" if len(self.k) else "")
         ]
-        floor = 1e-6 * np.max(np.abs(self.static), initial=1e-300)
+        floor = _NO_RESPONSE * np.max(np.abs(self.static), initial=1e-300)
+        endless = self._without_limit()
         for j, source in enumerate(self.inputs):
             for i, output in enumerate(COEFFICIENTS):
                 if abs(self.static[i, j]) > floor:
                     slope = "" if np.isnan(self.slope[i, j]) else f", H'(0) = {self.slope[i, j]:.6g}"
+                    if slope and output in endless:
+                        slope = ", H'(0) has no limit"
                     lines.append(f"  {output} to {source}: H(0) = {self.static[i, j]:.6g}{slope}")
         return "\n".join(lines)
 
-    def plot(self, outputs: tuple[str, ...] = ("CN", "Cm")) -> Figure:
-        """Part in phase, and part out of phase over k, of each channel against reduced frequency."""
+    def _without_limit(self) -> set[str]:
+        """Loads whose lag behind any input keeps the wake's tail: those that alpha changes, if plane and subsonic."""
+        if "alpha" not in self.inputs:
+            return set()
+        slopes = {load: self.at_zero(load, "alpha")[0] for load in ("CA", "CN", "Cm")}
+        return {name.partition("_")[0] for name in without_limit(self.condition, self.plane, slopes)}
+
+    def plot(self, outputs: tuple[str, ...] | None = None) -> Figure:
+        """Part in phase, and part out of phase over k, of each channel against reduced frequency.
+
+        A column for each input: of `outputs`, or, if not given, of CN and Cm (alpha, q), of Cl and Cn (beta, p, r).
+        """
         import matplotlib.pyplot as plt
 
+        columns = [outputs or (("Cl", "Cn") if source in LATERAL else ("CN", "Cm")) for source in self.inputs]
+        rows = len(columns[0])
         figure, axes = plt.subplots(
-            len(outputs), len(self.inputs), squeeze=False, figsize=(4.2 * len(self.inputs), 2.8 * len(outputs))
+            rows, len(columns), squeeze=False, figsize=(4.2 * len(columns), 2.8 * rows), layout="constrained"
         )
-        moving = self.k > 0.0
+        order = np.argsort(self.k)
+        moving = order[self.k[order] > 0.0]
         k = self.k[moving]
-        for i, output in enumerate(outputs):
-            for j, source in enumerate(self.inputs):
+        for j, (source, column) in enumerate(zip(self.inputs, columns, strict=True)):
+            largest = float(np.max(np.abs(self.values[:, :, j]), initial=0.0))
+            for panel, output in zip(axes[:, j], column, strict=True):
                 values = self.channel(output, source)[moving]
-                axes[i, j].semilogx(k, values.real, ".-", label="in phase")
-                axes[i, j].semilogx(k, values.imag / k, ".--", label="out of phase / k")
-                axes[i, j].set_ylabel(f"{output} to {source}")
-                axes[-1, j].set_xlabel("reduced frequency k")
+                panel.set_title(f"{output} to {source}", fontsize="medium")
+                panel.set_ylabel("per rad")
+                if not np.max(np.abs(values), initial=0.0) > _NO_RESPONSE * largest:
+                    panel.text(0.5, 0.5, "does not respond", transform=panel.transAxes, ha="center", va="center")
+                    panel.set(xticks=(), yticks=())
+                    continue
+                panel.semilogx(k, values.real, ".-", label="in phase")
+                panel.semilogx(k, values.imag / k, ".--", label="out of phase / k")
+                panel.set_xlabel("reduced frequency k = ωc/2V")
         axes[0, 0].legend()
-        figure.tight_layout()
         return figure
 
 
-def check_inputs(inputs: tuple[str, ...]) -> None:
+def check_inputs(inputs: Sequence[str]) -> None:
     """Raise InputError unless all are of `INPUTS` and none comes twice."""
+    if isinstance(inputs, str) or not inputs:
+        raise InputError(f"inputs is {inputs!r}, must hold one or more of {', '.join(INPUTS)}, such as ('alpha', 'q')")
     for name in inputs:
         if name not in INPUTS:
             raise InputError(f"no input {name!r}; there are {', '.join(INPUTS)}")

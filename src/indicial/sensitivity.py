@@ -2,6 +2,7 @@ r"""What six steady coefficients change with: velocity, rates, their time deriva
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,6 +12,14 @@ from indicial.motion import FlightCondition
 
 MOTIONS = ("u", "v", "w", "p", "q", "r")
 PARAMETERS = (*MOTIONS, "mach", "x_ref", "y_ref", "z_ref")
+
+_UNITS = (
+    dict.fromkeys("uvw", "per m/s")
+    | dict.fromkeys("pqr", "per rad/s")
+    | {"mach": "per M"}
+    | dict.fromkeys(("x_ref", "y_ref", "z_ref"), "per m")
+)
+_UNKNOWN_IF_PLANE = ("CY", "Cl", "Cn", "v", "p", "r", "y_ref")
 
 
 @dataclass(frozen=True)
@@ -64,11 +73,15 @@ class Sensitivities:
         return per_radian if angle == motion else per_radian / float(scale[1 if angle == "alpha" else 2])
 
     def summary(self) -> str:
-        """A table, one coefficient a line."""
-        head = "".join(f"{name:>12}" for name in PARAMETERS)
-        rows = [f"at M {self.condition.mach:g}" + head[len(f"at M {self.condition.mach:g}") - 4 :]]
-        for name, row in zip(COEFFICIENTS, self.values, strict=True):
-            rows.append(f"{name:<4}" + "".join(f"{value:>12.4g}" for value in row))
+        """A table, one coefficient a line, its derivatives with their units; of a plane flow what is known."""
+        known = [name for name in PARAMETERS if not (self.plane and name in _UNKNOWN_IF_PLANE)]
+        loads = [name for name in COEFFICIENTS if not (self.plane and name in _UNKNOWN_IF_PLANE)]
+        rows = [
+            f"derivatives at M {self.condition.mach:g}, alpha {math.degrees(self.condition.alpha):.4g} deg",
+            "    " + "".join(f"{name:>12}" for name in known),
+            "    " + "".join(f"{_UNITS[name]:>12}" for name in known),
+        ]
+        rows += [f"{load:<4}" + "".join(f"{self.value(load, name):>12.4g}" for name in known) for load in loads]
         return "\n".join(rows)
 
 

@@ -94,13 +94,13 @@ def run(case: Target, output: Output = None, workers: Workers = None, verbose: V
     typer.echo(f"report: {folder.path / 'report.html'}")
 
 
-@app.command(epilog="**Example:** `indicial mesh data/cases/basic_finner_quick.toml -o runs/finner`")
+@app.command(epilog="**Example:** `indicial mesh data/cases/basic_finner_quick.toml`")
 def mesh(case: Target, output: Output = None, verbose: Verbose = False) -> None:
     """Make and check the meshes of the half and the whole model."""
     _perform(case, output, None, verbose, ("mesh",), resume=False)
 
 
-@app.command(epilog="**Example:** `indicial derive runs/finner --method mrf`")
+@app.command(epilog="**Example:** `indicial derive runs/basic_finner_quick --method mrf`")
 def derive(
     case: Target,
     method: Annotated[Method, typer.Option("--method", "-m", help="Which of the methods.")] = Method.ALL,
@@ -117,25 +117,25 @@ def derive(
     _perform(case, output, workers, verbose, ("mesh", *stages), resume=True)
 
 
-@app.command(epilog="**Example:** `indicial rom runs/finner`")
+@app.command(epilog="**Example:** `indicial rom runs/basic_finner_quick`")
 def rom(case: Target, output: Output = None, verbose: Verbose = False) -> None:
     """A state-space model from the step responses, checked against the forced oscillations it has not seen."""
     _perform(case, output, None, verbose, ("rom",), resume=False)
 
 
-@app.command(epilog="**Example:** `indicial fly runs/finner`")
+@app.command(epilog="**Example:** `indicial fly runs/basic_finner_quick`")
 def fly(case: Target, output: Output = None, verbose: Verbose = False) -> None:
     """Fly the model twice, with derivatives and with the reduced-order model in the loop; check the damping."""
     _perform(case, output, None, verbose, ("fly",), resume=False)
 
 
-@app.command(epilog="**Example:** `indicial identify runs/finner`")
+@app.command(epilog="**Example:** `indicial identify runs/basic_finner_quick`")
 def identify(case: Target, output: Output = None, verbose: Verbose = False) -> None:
     """Measure the flight as a spark range does, with noise, and identify its derivatives."""
     _perform(case, output, None, verbose, ("identify",), resume=False)
 
 
-@app.command(epilog="**Example:** `indicial compare runs/finner`")
+@app.command(epilog="**Example:** `indicial compare runs/basic_finner_quick`")
 def compare(case: Target, output: Output = None, verbose: Verbose = False) -> None:
     """Set every derivative by every method beside the measured ones: results.json and a table."""
     from indicial.pipeline import open_run
@@ -144,7 +144,7 @@ def compare(case: Target, output: Output = None, verbose: Verbose = False) -> No
     typer.echo((open_run(case, output)[1].path / "comparison.txt").read_text(encoding="utf-8"))
 
 
-@app.command(epilog="**Example:** `indicial report runs/finner`")
+@app.command(epilog="**Example:** `indicial report runs/basic_finner_quick`")
 def report(case: Target, output: Output = None, verbose: Verbose = False) -> None:
     """Draw the figures and write the HTML report, one file that needs nothing else."""
     _perform(case, output, None, verbose, ("report",), resume=False)

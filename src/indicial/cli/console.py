@@ -11,6 +11,8 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 _PLAIN_INTERVAL = 10.0
+_FORESEEABLE = 0.02
+"""Fraction from which the time left is told: a start says little of the rest."""
 
 
 class ConsoleReporter:
@@ -60,7 +62,8 @@ class ConsoleReporter:
         elif (now := time.monotonic()) - self._said > _PLAIN_INTERVAL and fraction > 0.0:
             self._said = now
             left = (now - self._begun) * (1.0 - fraction) / fraction
-            self._console.print(f"  {fraction:.0%}, about {left:.0f} s left: {escape(text)}", soft_wrap=True)
+            foreseen = f", about {left:.0f} s left" if fraction >= _FORESEEABLE else ""
+            self._console.print(f"  {fraction:.0%}{foreseen}: {escape(text)}", soft_wrap=True)
 
     def finish(self, seconds: float, text: str) -> None:
         """The stage is complete."""

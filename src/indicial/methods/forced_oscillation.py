@@ -155,6 +155,8 @@ def experiment(
     """The oscillation at amplitude [rad] and reduced frequency k (Eq. 5)."""
     if motion not in KINDS.values():
         raise InputError(f"no oscillation {motion!r}; there are {', '.join(KINDS.values())}")
+    if not (np.isfinite(k) and k > 0.0):
+        raise InputError(f"reduced frequency k is {k}, must be positive and finite")
     return PitchOscillation.from_reduced_frequency(
         condition, reference, amplitude, k, varies_alpha=motion != "pitch_rate", rotates=motion != "plunge"
     )

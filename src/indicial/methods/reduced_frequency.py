@@ -159,10 +159,10 @@ class PeriodicLoads:
         import matplotlib.pyplot as plt
 
         phase = np.linspace(0.0, 2.0 * np.pi, SAMPLES + 1)
-        axes: Axes = plt.subplots()[1] if ax is None else ax
+        axes: Axes = plt.subplots(layout="constrained")[1] if ax is None else ax
         label = f"{self.harmonics} harmonic{'s' if self.harmonics > 1 else ''}"
         axes.plot(np.degrees(self.amplitude * np.sin(phase)), self.at(phase)[:, _column(name)], label=label)
-        axes.set_xlabel("A sin wt [deg]")
+        axes.set_xlabel("A sin ωt [deg]")
         axes.set_ylabel(name)
         axes.legend()
         return axes

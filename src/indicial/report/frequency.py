@@ -70,6 +70,8 @@ def frequency_figure(
                     axes.set_title(f"{symbol(name)}, {_MOTIONS[motion]}, {label}", fontsize=9)
         for axes in panels[1]:
             axes.set_xlabel("reduced frequency k = ωd/2V")
+        for axes in panels[:, 0]:
+            axes.set_ylabel("per rad")
         figure.legend(*panels[0, 0].get_legend_handles_labels(), fontsize=8, loc="outside lower center", ncols=4)
         return figure
 

@@ -161,7 +161,7 @@ def _meshes(results: Results) -> list[Claim]:
         claim = largest(title, target, high, np.array([c.change for c in judged]))
         settled = sum(c.asymptotic for c in judged)
         worst = max((c.index / abs(c.value) for c in judged), default=0.0)
-        note = f"asymptotic at {settled} of {len(judged)}; largest grid-convergence index {worst:.1%}"
+        note = f"asymptotic at {settled} of {len(judged)}; largest grid-convergence index {worst:.1%}" if judged else ""
         listed.append(_with(claim, note, complete=len(high) == len(SUPERSONIC)))
     return [*listed, _kinds(results), _domains(results)]
 
