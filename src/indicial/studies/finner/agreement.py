@@ -163,7 +163,7 @@ def _meshes(results: Results) -> list[Claim]:
         worst = max((c.index / abs(c.value) for c in judged), default=0.0)
         note = f"asymptotic at {settled} of {len(judged)}; largest grid-convergence index {worst:.1%}" if judged else ""
         listed.append(_with(claim, note, complete=len(high) == len(SUPERSONIC)))
-    return [*listed, _kinds(results), _domains(results)]
+    return [*listed, _kinds(results), *_domains(results)]
 
 
 def _levels_at(results: Results, mach: float) -> int:
@@ -184,11 +184,18 @@ def _kinds(results: Results) -> Claim:
     return largest("damping sum: mesh with a sting against mesh without a wake", None, machs, np.array(deviations))
 
 
-def _domains(results: Results) -> Claim:
-    """Cm_alphadot in a domain twice as wide, about its jump near M 1.2."""
-    found = pairs(results, "operator", "Cm_alphadot", None, "Cm_q", mesh="sting_wide", against="sting")
-    title = "Cm_alphadot: domain twice as wide, about M 1.2, of Cm_q"
-    return largest(title, None, [one.mach for one in found], np.array([one.deviation for one in found]))
+def _domains(results: Results) -> list[Claim]:
+    """What the domain's size changes on the quick mesh with a sting."""
+    listed = []
+    for mesh, words in (
+        ("sting_wide", "domain twice as far behind and beside"),
+        ("needle", "20 calibres ahead, not 2"),
+    ):
+        for k in (None, FORCED_K):
+            found = pairs(results, "operator", SUM, k, mesh=mesh, against="sting")
+            title = f"damping sum at k = {0.0 if k is None else k:g}: {words}"
+            listed.append(largest(title, None, [one.mach for one in found], np.array([one.deviation for one in found])))
+    return listed
 
 
 def _cost(results: Results) -> list[Claim]:

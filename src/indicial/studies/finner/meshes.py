@@ -13,22 +13,22 @@ from indicial.cfd.mesh import Mesh, WideDomain, finned_body_mesh
 from indicial.cfd.shapes import FinnedBody
 from indicial.errors import InputError
 from indicial.reference_data import FINNER_DIAMETER
+from indicial.studies.finner.pieces import DOMAINS
 from indicial.studies.study import Progress
 
 FINENESS = {
     "base": {"quick": 1.0, "coarse": 1.5, "medium": 2.25},
     "sting": {"quick": 0.7, "coarse": 1.0, "medium": 1.5},
     "sting_wide": {"quick": 0.7},
+    "needle": {"quick": 0.7},
 }
 """Cells along each direction relative to the quick preset of `finned_body_mesh`."""
 
-DOMAINS = {"sting": WideDomain(), "sting_wide": WideDomain(40.0, 40.0, 60.0)}
-"""Of the meshes with a sting; the second is twice as large every way, with the same cells where both are."""
-
 NAMES = {
     "base": "half body to the base plane",
-    "sting": "half body with a sting, wide domain",
-    "sting_wide": "half body with a sting, domain twice as wide",
+    "sting": "half body with a sting, from 2 calibres ahead of the nose",
+    "sting_wide": "half body with a sting, twice as far behind and beside",
+    "needle": "half body with a sting, from 20 calibres ahead of the nose",
 }
 
 FINNER = FinnedBody.basic_finner(FINNER_DIAMETER)
@@ -39,7 +39,7 @@ def finner_mesh(kind: str, level: str, mach: float) -> Mesh:
 
     Parameters
     ----------
-    kind : {"base", "sting", "sting_wide"}
+    kind : {"base", "sting", "sting_wide", "needle"}
     level : {"quick", "coarse", "medium"}
     mach : float
         The mesh to the base plane follows the bow shock of this Mach number; the one with a sting is for all.
@@ -49,7 +49,7 @@ def finner_mesh(kind: str, level: str, mach: float) -> Mesh:
         raise InputError(f"no mesh {kind!r} of level {level!r}; there are {known}")
     if kind == "base":
         return finned_body_mesh(FINNER, FINENESS[kind][level], mach=mach)
-    return finned_body_mesh(FINNER, FINENESS[kind][level], wake="sting", domain=DOMAINS[kind])
+    return finned_body_mesh(FINNER, FINENESS[kind][level], wake="sting", domain=WideDomain(*DOMAINS[kind]))
 
 
 class Relay:

@@ -111,7 +111,7 @@ def pairs(
         kind = one.piece.mesh if against is None else against
         base = operators.select(mesh=kind, level=one.piece.level).at(one.piece.mach)
         # a method may refuse a derivative that has no limit
-        if base is None or not one.derivatives.select(name=name).records:
+        if base is None or (method != "operator" and not one.derivatives.select(name=name).records):
             continue
         # an operator's table has records at several k, those of the other methods at one
         wanted = {"k": k} if method == "operator" else {}
