@@ -69,7 +69,7 @@ class Claim:
             return "-"
         if self.unit != "%":
             return f"{value:.{digits}f} {self.unit}"
-        return f"{value:.{digits}%}" if value >= 1e-3 or value == 0.0 else f"{100.0 * value:.0e}%"
+        return f"{value:.{digits}%}" if value >= 1e-3 or value == 0.0 else f"{100.0 * value:.1g}%"
 
 
 def relative_rms(name: str, target: float | None, mach: Sequence[float], found: Array, wanted: Array) -> Claim:
