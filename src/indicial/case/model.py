@@ -123,7 +123,7 @@ class Flow(Section):
             le=1e-6,  # from a looser one the flow cannot be linearised
             description="residual of a steady state, relative to that of still air",
         ),
-    ] = 1e-9
+    ] = 1e-10
     unsteady_tolerance: Annotated[
         float,
         Field(gt=0.0, lt=1.0, description="residual left by a time step, relative to what the motion does to it"),
