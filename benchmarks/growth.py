@@ -64,6 +64,7 @@ def _one(factor: float) -> dict[str, float]:
     from indicial.cfd.march import Pattern
     from indicial.cfd.memory import operator_bytes
     from indicial.cfd.mesh import finned_body_mesh
+    from indicial.cfd.operator import KRYLOV_VECTORS
     from indicial.cfd.shapes import FinnedBody
     from indicial.methods import operator
     from indicial.motion import FlightCondition
@@ -87,7 +88,7 @@ def _one(factor: float) -> dict[str, float]:
         "operator_s": times[2] - times[1],
         "steady_bytes": steady,
         "operator_bytes": _peak() - before,
-        "foretold": operator_bytes(solver.grid, len(Pattern.wide(solver.grid).indices)),
+        "foretold": operator_bytes(solver.grid, len(Pattern.wide(solver.grid).indices), restart=KRYLOV_VECTORS),
     }
 
 

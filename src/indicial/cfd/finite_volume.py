@@ -27,7 +27,7 @@ from indicial.cfd.march.steady import Progress, SteadyState, converge
 from indicial.cfd.march.unsteady import march
 from indicial.cfd.memory import operator_bytes, require, steady_bytes
 from indicial.cfd.mesh import Mesh
-from indicial.cfd.operator import ANTISYMMETRIC, SYMMETRIC, FlowOperator
+from indicial.cfd.operator import ANTISYMMETRIC, KRYLOV_VECTORS, SYMMETRIC, FlowOperator
 from indicial.conventions import Array, ReferenceQuantities, mesh_from_body
 from indicial.errors import DivergenceError, InputError
 from indicial.frequency import INPUTS, FrequencyResponse, reduced_frequencies
@@ -287,7 +287,8 @@ class FiniteVolumeSolver:
         self._residual(state.q, state.motion)
         baseline = self._coefficients(*self._residual.forces(AMBIENT_PRESSURE), condition)
         pattern = Pattern.wide(self.grid)
-        require(operator_bytes(self.grid, len(pattern.indices)), f"the linearised flow on {self.grid.n_cells} cells")
+        wanted = operator_bytes(self.grid, len(pattern.indices), restart=KRYLOV_VECTORS)
+        require(wanted, f"the linearised flow on {self.grid.n_cells} cells")
         jacobian = Jacobian(self._residual, state.q, state.motion)
         symmetries: tuple[float | None, ...] = (SYMMETRIC, ANTISYMMETRIC) if self._cut.y else (None,)
         return tuple(

@@ -15,7 +15,7 @@ _BLOCK, _STATE, _GRADIENT = 25, 5, 15
 _REAL, _COMPLEX = 8, 16
 
 
-def operator_bytes(grid: Grid, entries: int, *, restart: int = 80, kept: int = 24) -> int:
+def operator_bytes(grid: Grid, entries: int, *, restart: int, kept: int = 24) -> int:
     """Most bytes that the linearised flow on `grid` takes at a time, complex solves included.
 
     Parameters
