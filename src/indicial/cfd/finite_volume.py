@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -37,6 +38,8 @@ from indicial.sensitivity import Sensitivities
 from indicial.solver import SteadyLoads, instants
 
 log = logging.getLogger(__name__)
+
+_SOLVER = "finite volume, Euler, second order"
 
 LINEARISED_FROM = 1e-6
 """Largest residual, relative to that of still air, of a steady state about which the flow is linearised."""
@@ -179,25 +182,13 @@ class FiniteVolumeSolver:
             )
         except DivergenceError as error:
             raise DivergenceError(f"{error}; {self._place(error)}, t = {error.time / unit:.4g} s") from error
-        return History(
-            time=t,
-            coefficients=self._coefficients(result.forces, result.moments, condition),
-            velocity=velocity,
-            rate=rate,
-            before=initial,
-            condition=condition,
-            reference=self._reference,
-            motion=motion.describe(),
-            provenance={
-                "solver": "finite volume, Euler, second order",
-                "version": __version__,
-                "mesh": self._kept.mesh_key,
-                "cells": self.grid.n_cells,
-                "jacobian_products": result.products,
-                "newton_steps": result.newton_steps,
-                "worst_step_residual": result.worst_residual,
-            },
-        )
+        loads = self._coefficients(result.forces, result.moments, condition)
+        spent = {
+            "jacobian_products": result.products,
+            "newton_steps": result.newton_steps,
+            "worst_step_residual": result.worst_residual,
+        }
+        return self._history(t, loads, initial, condition, motion, spent)
 
     def periodic(self, condition: FlightCondition, motion: Motion, period: float, harmonics: int = 1) -> History:
         """Loads at 2h + 1 instants of one period [s] of the flow under a periodic motion, truncated after h harmonics.
@@ -244,24 +235,40 @@ class FiniteVolumeSolver:
             self._residual(found.q[n], one)
             loads[n] = self._residual.forces(AMBIENT_PRESSURE)
         coefficients = self._coefficients(loads[:, 0], loads[:, 1], condition)
+        spent = {
+            "solver": f"{_SOLVER}, time-spectral",
+            "harmonics": int(harmonics),
+            "jacobian_products": int(found.history.products[-1]),
+            "newton_steps": found.history.steps,
+            "residual": float(found.history.residual[-1]),
+        }
+        return self._history(t, coefficients, coefficients[0], condition, motion, spent)
+
+    def _history(
+        self,
+        time: Array,
+        loads: Array,
+        before: Array,
+        condition: FlightCondition,
+        motion: Motion,
+        how: dict[str, Any],
+    ) -> History:
+        """Loads under a motion, labelled with how they were got."""
         return History(
-            time=t,
-            coefficients=coefficients,
-            velocity=velocity,
-            rate=rate,
-            before=coefficients[0],
+            time=time,
+            coefficients=loads,
+            velocity=motion.velocity(time),
+            rate=motion.rate(time),
+            before=before,
             condition=condition,
             reference=self._reference,
             motion=motion.describe(),
             provenance={
-                "solver": "finite volume, Euler, second order, time-spectral",
+                "solver": _SOLVER,
                 "version": __version__,
                 "mesh": self._kept.mesh_key,
                 "cells": self.grid.n_cells,
-                "harmonics": int(harmonics),
-                "jacobian_products": int(found.history.products[-1]),
-                "newton_steps": found.history.steps,
-                "residual": float(found.history.residual[-1]),
+                **how,
             },
         )
 
