@@ -8,13 +8,14 @@ import pytest
 from indicial.conventions import ReferenceQuantities
 from indicial.derivatives import Derivative, DerivativeTable
 from indicial.errors import DivergenceError, InputError
+from indicial.files import write_text
 from indicial.motion import FlightCondition
 from indicial.pipeline.progress import LogReporter
 from indicial.studies import find_study
 from indicial.studies.claim import Claim, largest, relative_rms
 from indicial.studies.computing import AGREEMENT, compute, drift, matching
 from indicial.studies.kept import Results, keep
-from indicial.studies.piece import Piece, PieceResult, read_result, write_result
+from indicial.studies.piece import Piece, PieceResult, file_path, read_result, write_result
 from indicial.studies.study import Study
 
 MACHS = (1.5, 2.0, 3.0)
@@ -80,6 +81,26 @@ def test_kept_groups_grow_and_replace_and_come_back_as_they_were(tmp_path):
     from indicial.studies.kept import _read_group
 
     assert _read_group(paths[0]) == [made(PIECES[0], 2.0), made(PIECES[1]), made(PIECES[2])]
+
+
+def test_files_of_a_result_are_kept_beside_the_numbers_and_replaced_with_them(tmp_path):
+    from indicial.studies.kept import _read_group
+
+    work, kept = tmp_path / "work", tmp_path / "kept"
+    for text in ("before", "after"):
+        source = file_path(PIECES[0], work, "alpha.txt")
+        write_text(source, text)
+        write_result(replace(made(PIECES[0]), files={"alpha": source}), work)
+        found = read_result(PIECES[0], work)
+        assert found is not None
+        (path,) = keep(Results((found,)), kept)
+        assert _read_group(path)[0].file("alpha").read_text() == text
+    assert len(list(kept.iterdir())) == 2
+    with pytest.raises(InputError, match="there are alpha"):
+        found.file("q")
+    source.unlink()
+    with pytest.raises(InputError, match="there are none"):
+        keep(Results((found,)), kept)
 
 
 def test_a_broken_kept_file_is_named(tmp_path):

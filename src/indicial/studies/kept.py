@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Self
@@ -14,7 +15,7 @@ import numpy as np
 
 from indicial.conventions import Array
 from indicial.errors import InputError
-from indicial.files import write_text
+from indicial.files import atomic_path, write_text
 from indicial.reference_data import data_folder
 from indicial.studies.piece import SCHEMA_VERSION, Piece, PieceResult, read_json, read_result
 
@@ -94,10 +95,13 @@ class Results:
 
 
 def keep(results: Results, folder: Path) -> tuple[Path, ...]:
-    """Add results to a folder of kept ones, one file for each group; those of the same piece are replaced."""
+    """Add results to a folder of kept ones, one file for each group; those of the same piece are replaced.
+
+    What lies beside the numbers is copied, under names without the key: the same piece replaces it too.
+    """
     groups: dict[str, dict[str, PieceResult]] = defaultdict(dict)
     for result in results:
-        groups[result.piece.group][result.piece.name] = result
+        groups[result.piece.group][result.piece.name] = _with_files(result, folder)
     paths = []
     for group, found in groups.items():
         path = folder / f"{group}.json"
@@ -108,6 +112,17 @@ def keep(results: Results, folder: Path) -> tuple[Path, ...]:
     return tuple(paths)
 
 
+def _with_files(result: PieceResult, folder: Path) -> PieceResult:
+    """The result with its files copied into a folder."""
+    copies = {}
+    for label in result.files:
+        source = result.file(label)
+        copies[label] = folder / f"{result.piece.name}.{label}{source.suffix}"
+        with atomic_path(copies[label]) as temporary:
+            shutil.copyfile(source, temporary)
+    return replace(result, files=copies)
+
+
 def _files(folder: Traversable) -> list[Traversable]:
     if not folder.is_dir():
         return []
@@ -115,7 +130,7 @@ def _files(folder: Traversable) -> list[Traversable]:
 
 
 def _read_group(path: Path) -> list[PieceResult]:
-    return [PieceResult.from_dict(values) for values in read_json(path)["results"]]
+    return [PieceResult.from_dict(values, path.parent) for values in read_json(path)["results"]]
 
 
 def _group_text(results: Sequence[PieceResult]) -> str:

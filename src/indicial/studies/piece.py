@@ -68,19 +68,37 @@ class PieceResult:
     derivatives : DerivativeTable
     provenance : dict
         Command, version, mesh and its cells, convergence, products with J, times [s] (plain values).
+    files : dict
+        What is kept beside the numbers, such as histories and flows to be drawn: paths by label.
     """
 
     piece: Piece
     derivatives: DerivativeTable
     provenance: dict[str, Any]
+    files: dict[str, Path] = field(default_factory=dict)
+
+    def file(self, label: str) -> Path:
+        """A file kept beside the numbers.
+
+        Raises
+        ------
+        InputError
+            If there is none of that label, or it is gone.
+        """
+        path = self.files.get(label)
+        known = ", ".join(name for name, one in self.files.items() if one.is_file()) or "none"
+        if path is None or not path.is_file():
+            raise InputError(f"{self.piece.name} has no file {label!r} on disk; there are {known}")
+        return path
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values; what all records share is written once."""
-        return {"piece": asdict(self.piece), "provenance": self.provenance, **_factored(self.derivatives)}
+        """Plain values; what all records share is written once, and files by their names only."""
+        files = {"files": {label: path.name for label, path in self.files.items()}} if self.files else {}
+        return {"piece": asdict(self.piece), "provenance": self.provenance, **files, **_factored(self.derivatives)}
 
     @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> Self:
-        """Inverse of `to_dict`.
+    def from_dict(cls, values: dict[str, Any], folder: Path) -> Self:
+        """Inverse of `to_dict`, of a result whose files are in `folder`.
 
         Raises
         ------
@@ -89,7 +107,8 @@ class PieceResult:
         """
         try:
             records = [{**values["shared"], **record} for record in values["derivatives"]]
-            return cls(Piece(**values["piece"]), DerivativeTable.from_records(records), values["provenance"])
+            files = {label: folder / name for label, name in values.get("files", {}).items()}
+            return cls(Piece(**values["piece"]), DerivativeTable.from_records(records), values["provenance"], files)
         except (KeyError, TypeError) as error:
             raise InputError(f"bad result of a study's piece: {error}") from error
 
@@ -106,12 +125,18 @@ def read_result(piece: Piece, folder: Path) -> PieceResult | None:
     path = result_path(piece, folder)
     if not path.is_file():
         return None
-    return PieceResult.from_dict(read_json(path))
+    return PieceResult.from_dict(read_json(path), path.parent)
 
 
 def result_path(piece: Piece, folder: Path) -> Path:
     """Where the result of a piece is kept in the work folder."""
     return folder / "pieces" / f"{piece.name}-{piece.key}.json"
+
+
+def file_path(piece: Piece, folder: Path, name: str) -> Path:
+    """Where a file of a piece, such as ``alpha.nc``, is kept in the work folder: beside its result."""
+    path = result_path(piece, folder)
+    return path.with_name(f"{path.stem}.{name}")
 
 
 def read_json(path: Path) -> dict[str, Any]:

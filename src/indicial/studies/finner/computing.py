@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,18 +13,47 @@ from indicial.cfd import FiniteVolumeSolver
 from indicial.derivatives import Derivative, DerivativeTable
 from indicial.errors import InputError
 from indicial.methods import forced_oscillation, indicial_response, moving_frame, operator
-from indicial.motion import FlightCondition
+from indicial.motion import FlightCondition, Rates
 from indicial.studies.finner.meshes import NAMES, RELAY, finner_solver
-from indicial.studies.piece import Piece, PieceResult, version
+from indicial.studies.finner.pitching_flow import PitchingFlow
+from indicial.studies.piece import Piece, PieceResult, file_path, version
 from indicial.studies.study import Progress
 
 LONGITUDINAL = ("CN_alpha", "CN_q", "CN_alphadot", "Cm_alpha", "Cm_q", "Cm_alphadot")
 
-Found = tuple[DerivativeTable, dict[str, Any]]
+Writer = Callable[[Path], None]
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a method gives.
+
+    Parameters
+    ----------
+    table : DerivativeTable
+    work : dict
+        Products, residuals, steps: part of the provenance.
+    files : mapping
+        What writes each file that may be kept beside the numbers, by its label and suffix, such as ``"alpha.nc"``.
+    """
+
+    table: DerivativeTable
+    work: dict[str, Any]
+    files: Mapping[str, Writer] = field(default_factory=dict)
+
+    def write(self, piece: Piece, folder: Path) -> dict[str, Path]:
+        """Write the files into a work folder; their paths by label."""
+        paths = {}
+        for name, write in self.files.items():
+            paths[Path(name).stem] = file_path(piece, folder, name)
+            write(paths[Path(name).stem])
+        return paths
 
 
 def compute(piece: Piece, folder: Path | None, progress: Progress | None = None) -> PieceResult:
     """Compute one piece; steady states and the checkpoints of marches are kept under `folder`.
+
+    Pieces that are computed to be drawn write their histories or flows there too.
 
     Raises
     ------
@@ -40,7 +70,7 @@ def compute(piece: Piece, folder: Path | None, progress: Progress | None = None)
     RELAY.listener = progress
     try:
         base = solver.steady(condition)
-        table, work = _METHODS[method](solver, condition, piece.settings)
+        found = _METHODS[method](solver, condition, piece.settings)
     finally:
         RELAY.listener = None
     provenance = {
@@ -49,24 +79,28 @@ def compute(piece: Piece, folder: Path | None, progress: Progress | None = None)
         "mesh": NAMES[piece.mesh],
         "cells": solver.grid.n_cells,
         "steady": base.convergence,
-        **work,
+        **found.work,
         "wall_s": round(time.perf_counter() - wall, 1),
         "cpu_s": round(time.process_time() - cpu, 1),
     }
-    axial = Derivative.at(condition, solver.reference, "CA_0", table.records[0].method, base["CA"], "steady state")
-    return PieceResult(piece, DerivativeTable((*table, axial)), provenance)
+    how = found.table.records[0].method
+    axial = Derivative.at(condition, solver.reference, "CA_0", how, base["CA"], "steady state")
+    if method in _DRAWN and folder is None:
+        raise InputError(f"{piece.name} keeps files: it needs a folder for them")
+    files = found.write(piece, folder) if method in _DRAWN and folder is not None else {}
+    return PieceResult(piece, DerivativeTable((*found.table, axial)), provenance, files)
 
 
 def _operator(solver: FiniteVolumeSolver, condition: FlightCondition, settings: dict[str, Any]) -> Found:
     response = operator.run(solver, condition, settings["k"], ("alpha", "q", "p"))
     kept = DerivativeTable(tuple(r for r in operator.derivatives(response) if r.name in (*LONGITUDINAL, "Cl_p")))
-    return kept, {"operator": {name: response.provenance[name] for name in ("tolerance", "solves", "products")}}
+    return Found(kept, {"operator": {name: response.provenance[name] for name in ("tolerance", "solves", "products")}})
 
 
 def _moving_frame(solver: FiniteVolumeSolver, condition: FlightCondition, settings: dict[str, Any]) -> Found:
     result = moving_frame.run(solver, condition, ("alpha", "q"))
     kept = DerivativeTable(tuple(r for r in result.derivatives() if r.name in LONGITUDINAL))
-    return kept, {"states": {label: dict(how) for label, how in result.convergence.items()}}
+    return Found(kept, {"states": {label: dict(how) for label, how in result.convergence.items()}})
 
 
 def _forced_oscillation(solver: FiniteVolumeSolver, condition: FlightCondition, settings: dict[str, Any]) -> Found:
@@ -81,20 +115,35 @@ def _forced_oscillation(solver: FiniteVolumeSolver, condition: FlightCondition, 
     )
     reading = forced_oscillation.fourier(history)
     assert reading.periodicity is not None
-    return reading.derivatives(), {"march": history.provenance, "periodicity": float(reading.periodicity.max())}
+    work = {"march": history.provenance, "periodicity": float(reading.periodicity.max())}
+    return Found(reading.derivatives(), work, {"loop.nc": history.to_netcdf})
 
 
 def _indicial_response(solver: FiniteVolumeSolver, condition: FlightCondition, settings: dict[str, Any]) -> Found:
     s = indicial_response.step_times(settings["first"], settings["growth"], settings["largest"], settings["end"])
     sizes: dict[indicial_response.StepKind, float] = {"alpha": math.radians(settings["alpha_deg"]), "q": settings["q"]}
     responses, marches = {}, {}
+    files: dict[str, Writer] = {}
     for kind, amplitude in sizes.items():
         history = indicial_response.run(solver, condition, amplitude, s, kind)
         step = indicial_response.experiment(condition, solver.reference, amplitude, kind)
         responses[kind] = indicial_response.read(history, solver.steady(*indicial_response.after(step)))
         marches[kind] = history.provenance
+        files[f"{kind}.nc"] = history.to_netcdf
     result = indicial_response.derive(responses["alpha"], responses["q"])
-    return result.derivatives(), {"marches": marches, "refused": result.refused}
+    return Found(result.derivatives(), {"marches": marches, "refused": result.refused}, files)
+
+
+def _pitching_flow(solver: FiniteVolumeSolver, condition: FlightCondition, settings: dict[str, Any]) -> Found:
+    """Loads and flow in a steady pitch rate."""
+    there = replace(condition, alpha=math.radians(settings["alpha_deg"]))
+    rates = Rates(q=settings["q"] / float(solver.reference.rate_scale(condition.speed)[1]))
+    loads = solver.steady(there, rates)
+    records = tuple(
+        Derivative.at(there, solver.reference, f"{name}_0", "mrf", loads[name], "steady pitch") for name in ("CN", "Cm")
+    )
+    flow = PitchingFlow.of(solver.field(there, rates), solver.reference.length, settings["q"])
+    return Found(DerivativeTable(records), {"pitching": loads.convergence}, {"flow.npz": flow.save})
 
 
 _METHODS: dict[str, Callable[[FiniteVolumeSolver, FlightCondition, dict[str, Any]], Found]] = {
@@ -102,4 +151,11 @@ _METHODS: dict[str, Callable[[FiniteVolumeSolver, FlightCondition, dict[str, Any
     "mrf": _moving_frame,
     "fom": _forced_oscillation,
     "irm": _indicial_response,
+    "field": _pitching_flow,
+    "loop": _forced_oscillation,
+    "steps": _indicial_response,
+    "time_step": _forced_oscillation,
 }
+
+_DRAWN = ("field", "loop", "steps")
+"""Methods whose files are kept."""

@@ -104,10 +104,50 @@ def _marches(level: str) -> list[Piece]:
     return listed
 
 
+SHOWN = (1.2, 2.0, 4.0)
+"""Mach numbers of the pictures."""
+
+LOOP = {"amplitude_deg": 0.5, "periods": 2, "steps_per_period": 120}
+
+STEPS_PER_PERIOD = {0.3: 420, 0.2: 628, 0.1: 1256, 0.05: 2514}
+"""Steps of a period at k = 0.025 by U dt/d, within 0.3% (a period is 125.7 d/U); 0.3 and 0.05 as published."""
+
+SONIC = 1.0
+"""Mach number of the time-step study."""
+
+
+def _shown() -> list[Piece]:
+    """What keeps flows and histories beside the numbers, to be drawn."""
+    listed = []
+    for mach in SHOWN:
+        kind = _kind(mach)
+        listed.append(_piece("field", kind, "medium", mach, alpha_deg=0.0, q=0.01))
+        listed += [
+            _piece(f"loop_k{k:g}", kind, "coarse", mach, **LOOP, motion="pitch", k=k) for k in REDUCED_FREQUENCIES
+        ]
+        end = 160.0 if mach < 1.4 else 60.0
+        listed.append(_piece("steps", kind, "coarse", mach, **STEP, end=end, largest=0.5))
+    return listed
+
+
+def _time_steps(level: str) -> list[Piece]:
+    """One oscillation by ever smaller steps, and what the operator says of steps without end."""
+    operator = _piece("operator_without_steps", "sting", level, SONIC, k=[FORCED["k"]])
+    marches = [
+        _piece(
+            f"time_step_{step:g}", "sting", level, SONIC, **{**FORCED, "steps_per_period": count}, motion="pitch_rate"
+        )
+        for step, count in STEPS_PER_PERIOD.items()
+    ]
+    return [operator, *marches]
+
+
 PIECES: tuple[Piece, ...] = (
     *_sweep(),
     *_directly_about(6.1),
     *_domains(),
     *(piece for level in MARCHED for piece in (*_moving_frame(level), *_marches(level))),
+    *_shown(),
+    *_time_steps("quick"),
 )
 """All of them."""
