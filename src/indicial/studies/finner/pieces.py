@@ -42,9 +42,12 @@ TRANSONIC = tuple(sorted((*BETWEEN_TRANSONIC, *(mach for mach in FLIGHTS if mach
 SUPERSONIC = tuple(sorted((*BETWEEN_SUPERSONIC, *(mach for mach in FLIGHTS if mach >= LOWEST_WITHOUT_WAKE))))
 
 FIVE = (1.293, 1.5, 2.0, 2.718, 4.0)
-"""Mach numbers of the time marches."""
+"""Mach numbers of the time marches in all motions."""
 
-MARCHED = ("quick", "coarse")
+ABOUT_THE_JUMP = (1.12, 1.16, 1.2, 1.24)
+"""Mach numbers of the marches that give Cm_alphadot: plunging, and steps."""
+
+MARCHED = ("quick", "medium")
 """Levels of the mesh on which the methods are set against each other."""
 
 AMPLITUDES = {"pitch_deg": 0.05, "alpha_step_deg": 0.02, "q_step": 2e-4}
@@ -52,6 +55,10 @@ AMPLITUDES = {"pitch_deg": 0.05, "alpha_step_deg": 0.02, "q_step": 2e-4}
 
 FORCED = {"k": 0.025, "amplitude_deg": AMPLITUDES["pitch_deg"], "periods": 2, "steps_per_period": 120}
 STEP = {"alpha_deg": AMPLITUDES["alpha_step_deg"], "q": AMPLITUDES["q_step"], "first": 0.02, "growth": 1.08}
+
+SLOWEST = {"sting": {"end": 240.0, "largest": 1.0}, "base": {"end": 80.0, "largest": 0.5}}
+"""Reduced time of a step's record, and its largest interval: a supersonic response is over when the slowest wave has
+left the body; near M 1 that takes far longer."""
 
 
 def _piece(method: str, kind: str, level: str, mach: float, **settings: Any) -> Piece:
@@ -87,21 +94,26 @@ def _kind(mach: float) -> str:
     return "base" if mach >= LOWEST_WITHOUT_WAKE else "sting"
 
 
-def _moving_frame(level: str) -> list[Piece]:
-    return [_piece("mrf", _kind(mach), level, mach) for mach in (1.077, 1.2, 1.293, 1.5, 2.0, 2.718, 4.0)]
+def _moving_frame() -> list[Piece]:
+    """Everywhere on the quick mesh, at the marches' Mach numbers on the finer one too."""
+    everywhere = [_piece("mrf", _kind(mach), "quick", mach) for mach in (*TRANSONIC, *SUPERSONIC)]
+    return everywhere + [_piece("mrf", _kind(mach), "medium", mach) for mach in FIVE]
 
 
 def _marches(level: str) -> list[Piece]:
     listed = []
-    for mach in FIVE:
+    for mach in sorted((*ABOUT_THE_JUMP, *FIVE)):
         kind = _kind(mach)
-        listed += [
-            _piece(f"fom_{motion}", kind, level, mach, **FORCED, motion=motion)
-            for motion in ("pitch", "pitch_rate", "plunge")
-        ]
-        # a supersonic response is over when the slowest wave has left; near M 1 that takes far longer
-        listed.append(_piece("irm", kind, level, mach, **STEP, end=160.0 if mach < 1.4 else 80.0, largest=0.5))
+        motions = ("pitch", "pitch_rate", "plunge") if mach in FIVE else ("plunge",)
+        listed += [_piece(f"fom_{motion}", kind, level, mach, **FORCED, motion=motion) for motion in motions]
+        listed.append(_piece("irm", kind, level, mach, **STEP, **SLOWEST[kind]))
     return listed
+
+
+def _halved_step() -> list[Piece]:
+    """Plunging with half the time step, where Cm_alphadot is largest."""
+    halved = {**FORCED, "steps_per_period": 2 * int(FORCED["steps_per_period"]), "motion": "plunge"}
+    return [_piece("fom_plunge_halved_step", "sting", "quick", 1.16, **halved)]
 
 
 SHOWN = (1.2, 2.0, 4.0)
@@ -146,7 +158,9 @@ PIECES: tuple[Piece, ...] = (
     *_sweep(),
     *_directly_about(6.1),
     *_domains(),
-    *(piece for level in MARCHED for piece in (*_moving_frame(level), *_marches(level))),
+    *_moving_frame(),
+    *(piece for level in MARCHED for piece in _marches(level)),
+    *_halved_step(),
     *_shown(),
     *_time_steps("quick"),
 )
