@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import brentq
 
 from indicial.conventions import Array, ReferenceQuantities, angular_frequency, flow_angles, velocity_from_angles
 from indicial.errors import InputError
@@ -302,3 +303,97 @@ class TabulatedMotion(Motion):
 
     def describe(self) -> dict[str, Any]:
         return {"kind": "tabulated", "samples": int(self.times.size)}
+
+
+@dataclass(frozen=True)
+class Multisine(Motion):
+    r"""Sums of sines in alpha and in pitch rate, each at frequencies of its own: one run tells all channels apart.
+
+    ``alpha - alpha0 = A sum sin(w_j t + phi_j)`` over `alpha_omega`, and q likewise over `rate_omega`, with Schroeder's
+    phases (IEEE Trans. Inf. Theory 16, 1970), which keep the sum's peak low, turned so that each sum starts at zero.
+
+    Parameters
+    ----------
+    condition : FlightCondition
+        The mean state, from which the motion starts.
+    alpha_omega, rate_omega : tuple of float
+        Angular frequencies [rad/s] of alpha and of q; either may be empty. `from_reduced_frequencies` takes k instead.
+    alpha_amplitude, rate_amplitude : float
+        Of each sine [rad], [rad/s].
+    """
+
+    condition: FlightCondition
+    alpha_omega: tuple[float, ...]
+    rate_omega: tuple[float, ...]
+    alpha_amplitude: float
+    rate_amplitude: float
+
+    def __post_init__(self) -> None:
+        both = (*self.alpha_omega, *self.rate_omega)
+        if not both or not all(math.isfinite(omega) and omega > 0.0 for omega in both) or len(set(both)) < len(both):
+            raise InputError("a multisine needs distinct frequencies, positive and finite")
+        if not (math.isfinite(self.alpha_amplitude) and math.isfinite(self.rate_amplitude)):
+            raise InputError("a multisine's amplitudes must be finite")
+
+    @classmethod
+    def from_reduced_frequencies(
+        cls,
+        condition: FlightCondition,
+        reference: ReferenceQuantities,
+        k: ArrayLike,
+        alpha_amplitude: float,
+        rate_amplitude: float,
+    ) -> Multisine:
+        """Reduced frequencies dealt out in turn: the first to alpha, the second to q, and so on.
+
+        `rate_amplitude` is of ``q c/2V``.
+        """
+        length = reference.length
+        omega = [angular_frequency(float(one), condition.speed, length) for one in np.ravel(np.asarray(k, dtype=float))]
+        rate = rate_amplitude * 2.0 * condition.speed / length
+        return cls(condition, tuple(omega[::2]), tuple(omega[1::2]), alpha_amplitude, rate)
+
+    def velocity(self, time: ArrayLike) -> Array:
+        c = self.condition
+        alpha = c.alpha + self.alpha_amplitude * _sines(self.alpha_omega, np.asarray(time, dtype=float))
+        cb, sb = math.cos(c.beta), math.sin(c.beta)
+        return c.speed * np.stack([np.cos(alpha) * cb, np.full_like(alpha, sb), np.sin(alpha) * cb], axis=-1)
+
+    def rate(self, time: ArrayLike) -> Array:
+        t = np.asarray(time, dtype=float)
+        omega = np.zeros((*t.shape, 3))
+        omega[..., 1] = self.rate_amplitude * _sines(self.rate_omega, t)
+        return omega
+
+    def describe(self) -> dict[str, Any]:
+        return {
+            "kind": "multisine",
+            "alpha_omega": list(self.alpha_omega),
+            "rate_omega": list(self.rate_omega),
+            "alpha_amplitude": self.alpha_amplitude,
+            "rate_amplitude": self.rate_amplitude,
+        }
+
+
+def _sines(omega: tuple[float, ...], time: Array) -> Array:
+    """Sum of unit sines with Schroeder's phases, 0 at t = 0; shape of `time`."""
+    if not omega:
+        return np.zeros_like(time)
+    w = np.array(omega)
+    index = np.arange(w.size)
+    phase = -np.pi * index * (index + 1) / w.size + np.pi / 2.0
+    total: Array = np.sin(np.multiply.outer(time + _zero(w, phase), w) + phase).sum(axis=-1)
+    return total
+
+
+def _zero(w: Array, phase: Array) -> float:
+    """First instant at which the sum of sines is zero."""
+
+    def total(t: float) -> float:
+        return float(np.sum(np.sin(w * t + phase)))
+
+    # no sum of sines without a mean keeps its sign for two periods of its slowest one
+    grid = np.linspace(0.0, 4.0 * np.pi / np.min(w), 64 * w.size * int(np.ceil(np.max(w) / np.min(w))))
+    values = np.array([total(float(t)) for t in grid])
+    first = int(np.flatnonzero(values[:-1] * values[1:] <= 0.0)[0])
+    return float(brentq(total, grid[first], grid[first + 1]))

@@ -3,6 +3,7 @@
 from indicial.rom.check import CheckedCoefficient, PredictionCheck, check_prediction
 from indicial.rom.convolution import ConvolutionModel
 from indicial.rom.deficiency import DeficiencyIntegral, deficiency, deficiency_integral
+from indicial.rom.identification import identify
 from indicial.rom.model import ReducedModel
 from indicial.rom.projection import HeldOut, OrderTrial, Projection, project
 from indicial.rom.quasi_steady import QuasiSteadyError, QuasiSteadyModel, quasi_steady_error
@@ -29,6 +30,7 @@ __all__ = [
     "check_prediction",
     "deficiency",
     "deficiency_integral",
+    "identify",
     "project",
     "quasi_steady_error",
     "realise",

@@ -1,4 +1,4 @@
-r"""Deficiency functions as sums of decaying modes, with exact constraints and poles by variable projection.
+r"""Deficiency functions, in time or frequency, as sums of decaying modes: exact constraints, poles found by the data.
 
 ``F_j(s) = sum over real poles of a_ij exp(-p_i s) + sum over pairs of exp(-sigma_i s) (a_ij cos(omega_i s) +
 b_ij sin(omega_i s))``. The poles are shared by the outputs j of one input. For given poles the amplitudes are a
@@ -9,12 +9,17 @@ are the unknowns, so every mode decays whatever the data.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from indicial.conventions import Array
+from indicial.rom.model import ComplexArray
 
 _RATIO = 1.3
 
@@ -55,35 +60,60 @@ class Modes:
         paired = (1.0 - decay) / z
         return np.concatenate([real, np.stack([paired.real, paired.imag], axis=1).ravel()])
 
-    def slopes(self, s: Array, horizon: float) -> tuple[Array, Array]:
-        """Changes of `basis` and of `integral` with the logarithm of each rate and frequency, in the order of `bounds`.
+    def transform(self, k: Array) -> ComplexArray:
+        """``ik`` times the integral of ``basis(s) exp(-iks)`` from 0 to infinity, shape (n, order)."""
+        ik = 1j * k[:, None]
+        real = ik / (ik + self.rates)
+        w, omega = ik + self.pairs[:, 0], self.pairs[:, 1]
+        q = w * w + omega**2
+        paired = np.stack([ik * w / q, ik * omega / q], axis=2)
+        return np.asarray(np.hstack([real, paired.reshape(k.size, -1)]))
 
-        Returns
-        -------
-        basis : ndarray
-            Shape (n_parameters, n, order); n_parameters is the order.
-        integral : ndarray
-            Shape (n_parameters, order).
-        """
+    def basis_slopes(self, s: Array) -> Array:
+        """Changes of `basis` with each entry of `to_vector`, shape (order, n, order)."""
         n = self.rates.size
-        basis, area = np.zeros((self.order, s.size, self.order)), np.zeros((self.order, self.order))
-        values, integral = self.basis(s), self.integral(horizon)
+        slopes, values = np.zeros((self.order, s.size, self.order)), self.basis(s)
         for i, p in enumerate(self.rates):
-            basis[i, :, i] = -p * s * values[:, i]
-            area[i, i] = -integral[i] + _end(p, horizon).real
+            slopes[i, :, i] = -p * s * values[:, i]
         for i, (sigma, omega) in enumerate(self.pairs):
             j = n + 2 * i
             cosine, sine = values[:, j], values[:, j + 1]
-            basis[j, :, j : j + 2] = -sigma * s[:, None] * values[:, j : j + 2]
-            basis[j + 1, :, j : j + 2] = omega * np.stack([-s * sine, s * cosine], axis=1)
-            z = sigma - 1j * omega
+            slopes[j, :, j : j + 2] = -sigma * s[:, None] * values[:, j : j + 2]
+            slopes[j + 1, :, j : j + 2] = omega * np.stack([-s * sine, s * cosine], axis=1)
+        return self._of_ratios(slopes)
+
+    def transform_slopes(self, k: Array) -> ComplexArray:
+        """Changes of `transform` with each entry of `to_vector`, shape (order, n, order)."""
+        n, ik = self.rates.size, 1j * k
+        slopes = np.zeros((self.order, k.size, self.order), dtype=np.complex128)
+        for i, p in enumerate(self.rates):
+            slopes[i, :, i] = -p * ik / (ik + p) ** 2
+        for i, (sigma, omega) in enumerate(self.pairs):
+            j, w = n + 2 * i, ik + sigma
+            q2 = (w * w + omega**2) ** 2
+            even, odd = ik * (omega**2 - w * w) / q2, -2.0 * ik * w * omega / q2
+            slopes[j, :, j : j + 2] = sigma * np.stack([even, odd], axis=1)
+            slopes[j + 1, :, j : j + 2] = omega * np.stack([odd, -even], axis=1)
+        return self._of_ratios(slopes)
+
+    def integral_slopes(self, horizon: float) -> Array:
+        """Changes of `integral` with each entry of `to_vector`, shape (order, order)."""
+        n = self.rates.size
+        slopes, integral = np.zeros((self.order, self.order)), self.integral(horizon)
+        for i, p in enumerate(self.rates):
+            slopes[i, i] = -integral[i] + _end(p, horizon).real
+        for i, (sigma, omega) in enumerate(self.pairs):
+            j, z = n + 2 * i, sigma - 1j * omega
             change = (-(integral[j] + 1j * integral[j + 1]) + _end(z, horizon)) / z
             for row, direction in ((j, sigma * change), (j + 1, -1j * omega * change)):
-                area[row, j : j + 2] = direction.real, direction.imag
-        # real rates are parametrised by their ratios: each ratio moves all faster rates
-        basis[:n] = np.cumsum(basis[:n][::-1], axis=0)[::-1]
-        area[:n] = np.cumsum(area[:n][::-1], axis=0)[::-1]
-        return basis, area
+                slopes[row, j : j + 2] = direction.real, direction.imag
+        return self._of_ratios(slopes)
+
+    def _of_ratios(self, slopes: NDArray[Any]) -> NDArray[Any]:
+        """Real rates are parametrised by their ratios: each ratio moves all faster rates."""
+        n = self.rates.size
+        slopes[:n] = np.cumsum(slopes[:n][::-1], axis=0)[::-1]
+        return slopes
 
     def to_vector(self) -> Array:
         """Logarithms: of the slowest real rate, of the ratios of the next ones, of the pairs' rates and frequencies."""
@@ -106,6 +136,16 @@ class Modes:
         lower[1:n], upper[1:n] = np.log(_RATIO), np.log(high / low)
         return lower, upper
 
+    def matrix(self) -> Array:
+        """State matrix (order, order): ``-p`` on the diagonal, ``[[-sigma, omega], [-omega, -sigma]]`` a pair."""
+        a = np.zeros((self.order, self.order))
+        n = self.rates.size
+        a[range(n), range(n)] = -self.rates
+        for i, (sigma, omega) in enumerate(self.pairs):
+            j = n + 2 * i
+            a[j : j + 2, j : j + 2] = [[-sigma, omega], [-omega, -sigma]]
+        return a
+
     def state_space(self, amplitudes: Array) -> tuple[Array, Array, Array]:
         """Real (A, b, C) whose response to a unit step, from rest, is ``F(0) - F(s)``.
 
@@ -117,20 +157,13 @@ class Modes:
         Returns
         -------
         A, b, C : ndarray
-            Shapes (order, order), (order, 1), (n_outputs, order). A pair is the block
-            ``[[-sigma, omega], [-omega, -sigma]]``; every state of a step settles at 1 (the second of a pair at 0).
+            Shapes (order, order), (order, 1), (n_outputs, order). A is `matrix`; every state of a step settles at 1
+            (the second of a pair at 0).
         """
-        a = np.zeros((self.order, self.order))
-        settled = np.zeros(self.order)
-        signs = np.ones(self.order)
-        n = self.rates.size
-        a[range(n), range(n)] = -self.rates
-        settled[:n] = 1.0
-        for i, (sigma, omega) in enumerate(self.pairs):
-            j = n + 2 * i
-            a[j : j + 2, j : j + 2] = [[-sigma, omega], [-omega, -sigma]]
-            settled[j] = 1.0
-            signs[j + 1] = -1.0
+        a = self.matrix()
+        settled, signs = np.ones(self.order), np.ones(self.order)
+        second = self.rates.size + 1 + 2 * np.arange(len(self.pairs))
+        settled[second], signs[second] = 0.0, -1.0
         return a, -(a @ settled)[:, None], (amplitudes * signs[:, None]).T
 
 
@@ -140,15 +173,13 @@ def _end(z: complex, horizon: float) -> complex:
 
 
 @dataclass(frozen=True)
-class Target:
-    """A deficiency function to be matched.
+class Target(ABC):
+    """What modes are to match: a deficiency function, in time or in frequency.
 
     Parameters
     ----------
-    s : ndarray
-        Reduced time, shape (n,).
     values : ndarray
-        F, shape (n, n_outputs).
+        Shape (n, n_outputs).
     initial : ndarray
         F(0+), imposed exactly, shape (n_outputs,).
     integral : ndarray, optional
@@ -156,18 +187,29 @@ class Target:
     horizon : float
         End of that integral.
     weights : ndarray
-        Quadrature weights of the samples, shape (n,).
+        Weight of each row of `values`, shape (n,).
     scale : ndarray
         What errors of each output are measured by, in the norm of `weights`, shape (n_outputs,).
     """
 
-    s: Array
     values: Array
     initial: Array
     integral: Array | None
     horizon: float
     weights: Array
     scale: Array
+
+    @abstractmethod
+    def basis(self, modes: Modes) -> Array:
+        """What each mode of unit amplitude gives, shape (n, order)."""
+
+    @abstractmethod
+    def slopes(self, modes: Modes) -> Array:
+        """Changes of `basis` with each entry of the modes' vector, shape (order, n, order)."""
+
+    @abstractmethod
+    def rate_bounds(self) -> tuple[float, float]:
+        """Slowest and fastest rate that the data can show."""
 
     def residual(self, basis: Array, amplitudes: Array) -> Array:
         """Weighted, scaled misfit of a basis (n, order), shape (n, n_outputs); its squared sum is the squared error."""
@@ -177,7 +219,41 @@ class Target:
 
     def error(self, modes: Modes, amplitudes: Array) -> float:
         """Root-mean-square error relative to `scale`, over all outputs."""
-        return float(np.linalg.norm(self.residual(modes.basis(self.s), amplitudes)))
+        return float(np.linalg.norm(self.residual(self.basis(modes), amplitudes)))
+
+
+@dataclass(frozen=True)
+class TimeTarget(Target):
+    """F at reduced times `s`, shape (n,)."""
+
+    s: Array
+
+    def basis(self, modes: Modes) -> Array:
+        return modes.basis(self.s)
+
+    def slopes(self, modes: Modes) -> Array:
+        return modes.basis_slopes(self.s)
+
+    def rate_bounds(self) -> tuple[float, float]:
+        return 0.2 / float(self.s[-1]), 5.0 / float(np.min(np.diff(self.s)))
+
+
+@dataclass(frozen=True)
+class FrequencyTarget(Target):
+    """``H(0) - H(ik)``, which is ik times the transform of F: real parts at `k`, shape (n/2,), then imaginary ones."""
+
+    k: Array
+
+    def basis(self, modes: Modes) -> Array:
+        transform = modes.transform(self.k)
+        return np.vstack([transform.real, transform.imag])
+
+    def slopes(self, modes: Modes) -> Array:
+        slopes = modes.transform_slopes(self.k)
+        return np.concatenate([slopes.real, slopes.imag], axis=1)
+
+    def rate_bounds(self) -> tuple[float, float]:
+        return 0.2 * float(np.min(self.k)), 5.0 * float(np.max(self.k))
 
 
 @dataclass(frozen=True)
@@ -201,7 +277,7 @@ def _solve(modes: Modes, target: Target) -> _Fit:
     inverse = q[:, :rank] @ np.linalg.inv(r[:rank].T)
     particular, free = inverse @ np.array(values), q[:, rank:]
     root = np.sqrt(target.weights)[:, None]
-    basis = modes.basis(target.s)
+    basis = target.basis(modes)
     weighted = root * basis
     left, singular, right = np.linalg.svd(weighted @ free, full_matrices=False)
     kept = singular > 1e-13 * np.max(singular, initial=0.0)
@@ -215,15 +291,21 @@ def fit_amplitudes(modes: Modes, target: Target) -> Array:
     return _solve(modes, target).amplitudes
 
 
+def joint_error(modes: Modes, targets: Sequence[Target]) -> float:
+    """Root-mean-square error of the best amplitudes over several targets."""
+    errors = [target.error(modes, fit_amplitudes(modes, target)) for target in targets]
+    return float(np.linalg.norm(errors) / np.sqrt(len(errors)))
+
+
 def _gradient(modes: Modes, fit: _Fit, target: Target) -> Array:
     """Change of the residual with the modes' parameters, shape (n n_outputs, order).
 
     Kaufman's approximation (BIT 15, 1975) of the variable-projection Jacobian, with the constraints followed.
     """
-    basis, area = modes.slopes(target.s, target.horizon)
-    direct = basis @ fit.amplitudes
+    direct = target.slopes(modes) @ fit.amplitudes
     if fit.constraint_inverse.shape[1] > 1:
         followed = fit.basis @ fit.constraint_inverse[:, 1]
+        area = modes.integral_slopes(target.horizon)
         direct -= followed[:, None] * (area @ fit.amplitudes)[:, None, :]
     direct *= np.sqrt(target.weights)[:, None]
     direct -= fit.range @ (fit.range.T @ direct)
@@ -231,47 +313,53 @@ def _gradient(modes: Modes, fit: _Fit, target: Target) -> Array:
     return np.asarray(scaled.reshape(modes.order, -1).T)
 
 
-def rate_bounds(s: Array) -> tuple[float, float]:
-    """Slowest and fastest rate that samples at `s` can show."""
-    return 0.2 / float(s[-1]), 5.0 / float(np.min(np.diff(s)))
+def rate_bounds(targets: Sequence[Target]) -> tuple[float, float]:
+    """Slowest and fastest rate that any of the targets can show."""
+    low, high = zip(*(target.rate_bounds() for target in targets), strict=True)
+    return min(low), max(high)
 
 
-def clipped(modes: Modes, s: Array) -> Modes:
+def clipped(modes: Modes, targets: Sequence[Target]) -> Modes:
     """Modes moved inside `rate_bounds`, real rates spread apart where they are too close."""
-    low, high = rate_bounds(s)
+    low, high = rate_bounds(targets)
     rates = np.clip(np.sort(modes.rates), 1.01 * low, 0.99 * high)
     for i in range(1, rates.size):
         rates[i] = max(rates[i], 1.01 * _RATIO * rates[i - 1])
     return Modes(rates, np.clip(modes.pairs, 1.01 * low, 0.99 * high))
 
 
-def refine(start: Modes, target: Target, tolerance: float = 1e-6, evaluations: int = 60) -> Modes:
+def refine(start: Modes, targets: Sequence[Target], tolerance: float = 1e-6, evaluations: int = 60) -> Modes:
     """Poles of least error near `start`, by variable projection.
 
     Parameters
     ----------
     start : Modes
-    target : Target
+    targets : sequence of Target
+        Each with amplitudes of its own; the poles are shared by all.
     tolerance : float
         Relative change of the error, and of the poles, at which the search ends.
     evaluations : int
         Most evaluations of the misfit.
     """
 
-    latest: dict[bytes, _Fit] = {}  # the gradient is asked for where the misfit was
+    latest: dict[bytes, list[_Fit]] = {}  # the gradient is asked for where the misfit was
+
+    def fits(vector: Array) -> list[_Fit]:
+        if vector.tobytes() not in latest:
+            latest.clear()
+            latest[vector.tobytes()] = [_solve(start.from_vector(vector), target) for target in targets]
+        return latest[vector.tobytes()]
 
     def misfit(vector: Array) -> Array:
-        modes = start.from_vector(vector)
-        latest.clear()
-        fit = latest[vector.tobytes()] = _solve(modes, target)
-        return target.residual(fit.basis, fit.amplitudes).ravel()
+        pairs = zip(targets, fits(vector), strict=True)
+        return np.concatenate([target.residual(fit.basis, fit.amplitudes).ravel() for target, fit in pairs])
 
     def gradient(vector: Array) -> Array:
         modes = start.from_vector(vector)
-        return _gradient(modes, latest.get(vector.tobytes()) or _solve(modes, target), target)
+        return np.vstack([_gradient(modes, fit, one) for one, fit in zip(targets, fits(vector), strict=True)])
 
-    first = clipped(start, target.s)
-    bounds = first.bounds(*rate_bounds(target.s))
+    first = clipped(start, targets)
+    bounds = first.bounds(*rate_bounds(targets))
     options = {"xtol": tolerance, "ftol": tolerance, "gtol": 1e-15, "max_nfev": evaluations}
     found = least_squares(misfit, first.to_vector(), gradient, bounds=bounds, **options)
     return start.from_vector(found.x)
