@@ -218,6 +218,21 @@ class FlowOperator:
         combined: Array = velocity @ v + omega @ w
         return combined
 
+    def wall_loads(self, x: Array, motion: str | None = None) -> Array:
+        """What each wall face adds to the loads of a real disturbance x (n,), shape (n_outputs, walls).
+
+        With the direct part of a unit of the input `motion`; in the order of the mesh's wall faces. Their sum is
+        ``C x + D u``.
+        """
+        g, weights = self._grid, self._load_faces
+        change = self.jacobian.face_fluxes(x.reshape(-1, 5), self._parity)[g.wall_faces, 1:4].copy()
+        if motion is not None:
+            velocity, omega = (m[:, self.inputs.index(motion)] for m in self.motions)
+            swept = g.normal[g.wall_faces] @ velocity + g.moment[g.wall_faces] @ omega / g.area[g.wall_faces]
+            change += swept[:, None] * self.jacobian.flux_swept[g.wall_faces, 1:4]
+        loads: Array = np.einsum("owk,wk->ow", weights, change)
+        return loads
+
     def apply(self, x: NDArray[Any], *, transposed: bool = False) -> NDArray[Any]:
         """``J x``, or ``J^T x``; x real or complex, (n,)."""
         product = self.jacobian.apply_transposed if transposed else self.jacobian.apply

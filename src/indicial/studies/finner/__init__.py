@@ -2,6 +2,7 @@
 
 from indicial.studies.finner.agreement import claims
 from indicial.studies.finner.computing import compute
+from indicial.studies.finner.experiments import EXPERIMENTS
 from indicial.studies.finner.figures import draw
 from indicial.studies.finner.pieces import PIECES
 from indicial.studies.study import Study
@@ -9,7 +10,7 @@ from indicial.studies.study import Study
 STUDY = Study(
     name="finner",
     title="Basic Finner, M 1.05 to 4.5, against free flight",
-    pieces=PIECES,
+    pieces=(*PIECES, *EXPERIMENTS),
     compute=compute,
     claims=claims,
     draw=draw,

@@ -11,8 +11,7 @@ from indicial.derivatives import DerivativeTable
 from indicial.reference_data import finner_arl, finner_range, read_table
 from indicial.studies.claim import Claim, largest, relative_rms
 from indicial.studies.finner.axial_force import axial_force
-from indicial.studies.finner.meshes import FINNER
-from indicial.studies.finner.pieces import LEVELS, LOWEST_WITHOUT_WAKE, PIECES, SUPERSONIC
+from indicial.studies.finner.pieces import LEVELS, LOWEST_WITHOUT_WAKE, OUTLYING, PIECES, SUPERSONIC
 from indicial.studies.finner.selection import (
     OTHER_MOMENT_REFERENCE,
     about,
@@ -23,15 +22,13 @@ from indicial.studies.finner.selection import (
     pairs,
     suitable,
 )
+from indicial.studies.finner.variants import FINNER
 from indicial.studies.kept import Results
 
 SUM = "Cm_q+Cm_alphadot"
 
 LOWEST_DAMPING, LOWEST_STATIC = 1.29, 1.8
 """Lowest Mach numbers of the comparisons of damping, and of static and roll derivatives."""
-
-OUTLYING = (2.718, 4.3)
-"""Groups of flights below which all CFD lies by a fifth; the first figure is taken without them."""
 
 FORCED_K = 0.025
 

@@ -14,8 +14,10 @@ from indicial.derivatives import Derivative, DerivativeTable
 from indicial.errors import InputError
 from indicial.methods import forced_oscillation, indicial_response, moving_frame, operator
 from indicial.motion import FlightCondition, Rates
+from indicial.studies.finner.by_part import derivatives_by_part
 from indicial.studies.finner.meshes import NAMES, RELAY, finner_solver
 from indicial.studies.finner.pitching_flow import PitchingFlow
+from indicial.studies.finner.variants import FINNER
 from indicial.studies.piece import Piece, PieceResult, file_path, version
 from indicial.studies.study import Progress
 
@@ -92,9 +94,21 @@ def compute(piece: Piece, folder: Path | None, progress: Progress | None = None)
 
 
 def _operator(solver: FiniteVolumeSolver, condition: FlightCondition, settings: dict[str, Any]) -> Found:
-    response = operator.run(solver, condition, settings["k"], ("alpha", "q", "p"))
+    """About the angle of attack among the settings, if there is one."""
+    there = replace(condition, alpha=math.radians(settings.get("alpha_deg", 0.0)))
+    response = operator.run(solver, there, settings["k"], ("alpha", "q", "p"))
     kept = DerivativeTable(tuple(r for r in operator.derivatives(response) if r.name in (*LONGITUDINAL, "Cl_p")))
     return Found(kept, {"operator": {name: response.provenance[name] for name in ("tolerance", "solves", "products")}})
+
+
+def _parts(solver: FiniteVolumeSolver, condition: FlightCondition, settings: dict[str, Any]) -> Found:
+    """The operator at k = 0, part by part."""
+    parts = derivatives_by_part(solver, condition, FINNER)
+    records = tuple(
+        Derivative.at(condition, solver.reference, name, "operator", sum(p[name] for p in parts.values()), "by parts")
+        for name in LONGITUDINAL
+    )
+    return Found(DerivativeTable(records), {"parts": parts})
 
 
 def _moving_frame(solver: FiniteVolumeSolver, condition: FlightCondition, settings: dict[str, Any]) -> Found:
@@ -148,6 +162,7 @@ def _pitching_flow(solver: FiniteVolumeSolver, condition: FlightCondition, setti
 
 _METHODS: dict[str, Callable[[FiniteVolumeSolver, FlightCondition, dict[str, Any]], Found]] = {
     "operator": _operator,
+    "parts": _parts,
     "mrf": _moving_frame,
     "fom": _forced_oscillation,
     "irm": _indicial_response,

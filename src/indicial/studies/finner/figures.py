@@ -12,9 +12,9 @@ from indicial.reference_data import finner_arl, finner_range, read_table
 from indicial.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, figure_style, save, symbol
 from indicial.studies.finner.agreement import SUM
 from indicial.studies.finner.axial_force import axial_force
-from indicial.studies.finner.meshes import FINNER
 from indicial.studies.finner.pieces import LEVELS, OVERLAP
 from indicial.studies.finner.selection import OTHER_MOMENT_REFERENCE, about, convergence, derivative, finest, suitable
+from indicial.studies.finner.variants import FINNER
 from indicial.studies.kept import Results
 
 if TYPE_CHECKING:

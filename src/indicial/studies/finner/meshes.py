@@ -10,10 +10,9 @@ from pathlib import Path
 
 from indicial.cfd import FiniteVolumeSolver
 from indicial.cfd.mesh import Mesh, WideDomain, finned_body_mesh
-from indicial.cfd.shapes import FinnedBody
 from indicial.errors import InputError
-from indicial.reference_data import FINNER_DIAMETER
 from indicial.studies.finner.pieces import DOMAINS
+from indicial.studies.finner.variants import FINNER, VARIANTS, body_of
 from indicial.studies.study import Progress
 
 FINENESS = {
@@ -31,15 +30,19 @@ NAMES = {
     "needle": "half body with a sting, from 20 calibres ahead of the nose",
 }
 
-FINNER = FinnedBody.basic_finner(FINNER_DIAMETER)
+for _variant in VARIANTS:
+    for _kind in ("base", "sting"):
+        FINENESS[f"{_kind}+{_variant}"] = FINENESS[_kind]
+        NAMES[f"{_kind}+{_variant}"] = f"{NAMES[_kind]}; the body's variant {_variant}"
 
 
 def finner_mesh(kind: str, level: str, mach: float) -> Mesh:
-    """Half a Basic Finner.
+    """Half a Basic Finner, or half of a variant of it.
 
     Parameters
     ----------
     kind : {"base", "sting", "sting_wide", "needle"}
+        The first two also with a variant of the body, such as ``"sting+half_span"``.
     level : {"quick", "coarse", "medium"}
     mach : float
         The mesh to the base plane follows the bow shock of this Mach number; the one with a sting is for all.
@@ -47,9 +50,15 @@ def finner_mesh(kind: str, level: str, mach: float) -> Mesh:
     if kind not in FINENESS or level not in FINENESS[kind]:
         known = "; ".join(f"{name}: {', '.join(levels)}" for name, levels in FINENESS.items())
         raise InputError(f"no mesh {kind!r} of level {level!r}; there are {known}")
-    if kind == "base":
-        return finned_body_mesh(FINNER, FINENESS[kind][level], mach=mach)
-    return finned_body_mesh(FINNER, FINENESS[kind][level], wake="sting", domain=WideDomain(*DOMAINS[kind]))
+    body, domain = body_of(kind), kind.partition("+")[0]
+    if follows_shock(kind):
+        return finned_body_mesh(body, FINENESS[kind][level], mach=mach)
+    return finned_body_mesh(body, FINENESS[kind][level], wake="sting", domain=WideDomain(*DOMAINS[domain]))
+
+
+def follows_shock(kind: str) -> bool:
+    """Whether a kind of mesh is made for one Mach number."""
+    return kind.partition("+")[0] == "base"
 
 
 class Relay:
@@ -70,7 +79,7 @@ def finner_solver(
     kind: str, level: str, mach: float, moment_reference: float, folder: Path | None
 ) -> FiniteVolumeSolver:
     """A solver on that mesh; the one before is used again where it is the same, and starts from its nearest state."""
-    return _solver(kind, level, mach if kind == "base" else None, moment_reference, folder)
+    return _solver(kind, level, mach if follows_shock(kind) else None, moment_reference, folder)
 
 
 @lru_cache(maxsize=1)

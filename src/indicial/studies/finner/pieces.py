@@ -10,6 +10,9 @@ from indicial.studies.piece import Piece
 LEVELS = ("quick", "coarse", "medium")
 """Systematically refined meshes, each with about 1.5 times as many cells along every direction as the one before."""
 
+OUTLYING = (2.718, 4.3)
+"""Groups of flights below which all CFD lies by a fifth; the first figure of damping is taken without them."""
+
 LOWEST_WITHOUT_WAKE = 1.5
 """Lowest Mach number of the mesh that ends at the base plane; below it the base and the wake act upstream."""
 

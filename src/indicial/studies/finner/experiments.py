@@ -1,0 +1,73 @@
+"""Pieces that ask where something comes from: one thing is changed, and what changes with it is looked at."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from indicial.reference_data import FINNER_MOMENT_REFERENCE
+from indicial.studies.finner.pieces import DOMAINS, OUTLYING
+from indicial.studies.finner.variants import VARIANTS
+from indicial.studies.piece import Piece
+
+NEAR_ONE = tuple(round(1.06 + 0.02 * n, 2) for n in range(14))
+"""Mach numbers about the jump of Cm_alphadot."""
+
+FINS_CHANGED = (
+    "no_fins", "plate_fins", "thickness_0.02", "thickness_0.04", "thickness_0.12", "double_wedge_fins", "half_span",
+)  # fmt: skip
+"""Variants computed about the jump."""
+
+OF_UNKNOWN_SIZE = ("no_fins", "thickness_0.04", "thickness_0.088", "thickness_0.12", "span_0.95", "chord_0.95")
+"""Variants computed at the outlying groups of flights."""
+
+INCIDENCES = dict.fromkeys((1.057, 1.077, 1.16, 1.254, 1.332), (0.5, 1.0, 2.0)) | dict.fromkeys(
+    OUTLYING, (1.0, 2.0, 3.0, 4.0, 5.0)
+)
+"""Angles of attack [deg] about which the flow is linearised, by Mach number; free flights yaw by 1 to 6 degrees."""
+
+SLOW = (0.0024, 0.004)
+"""Reduced frequencies of the flights themselves."""
+
+
+def _experiment(method: str, kind: str, level: str, mach: float, **settings: Any) -> Piece:
+    """About the usual moment reference; domain and changes of the body are among the settings."""
+    domain, _, variant = kind.partition("+")
+    if domain in DOMAINS:
+        settings["domain"] = list(DOMAINS[domain])
+    if variant:
+        settings["changes"] = VARIANTS[variant]
+    return Piece(method, kind, level, mach, {**settings, "moment_reference": FINNER_MOMENT_REFERENCE})
+
+
+def _near_one() -> list[Piece]:
+    """Where the jump sits on the body, and what of the fins it depends on."""
+    listed = [_experiment("parts", "sting", "quick", mach) for mach in NEAR_ONE]
+    listed += [_experiment("parts", "sting", "coarse", mach) for mach in (1.1, 1.14, 1.16, 1.18, 1.24, 1.3)]
+    for variant in FINS_CHANGED:
+        listed += [_experiment("operator", f"sting+{variant}", "quick", mach, k=[]) for mach in NEAR_ONE]
+    return listed
+
+
+def _about_incidence() -> list[Piece]:
+    """Derivatives about an angle of attack."""
+    listed = []
+    for mach, incidences in INCIDENCES.items():
+        kind, level = ("base", "coarse") if mach in OUTLYING else ("sting", "quick")
+        for alpha in incidences:
+            settings = {"k": [], "alpha_deg": alpha}
+            listed.append(_experiment(f"operator_at_{alpha:g}deg", kind, level, mach, **settings))
+    return listed
+
+
+def _outlying() -> list[Piece]:
+    """What may differ between the flights and the flow that is computed."""
+    listed = []
+    for mach in OUTLYING:
+        listed += [_experiment("operator", f"base+{name}", "coarse", mach, k=[]) for name in OF_UNKNOWN_SIZE]
+        listed += [_experiment("operator", "sting", level, mach, k=[]) for level in ("quick", "coarse")]
+        listed.append(_experiment("operator_slow", "base", "coarse", mach, k=list(SLOW)))
+    return listed
+
+
+EXPERIMENTS: tuple[Piece, ...] = (*_near_one(), *_about_incidence(), *_outlying())
+"""All of them."""
