@@ -1,0 +1,116 @@
+"""Steady states of a lattice, and its march through a motion."""
+
+from __future__ import annotations
+
+from itertools import accumulate, pairwise
+
+import numpy as np
+
+from indicial.cfd.lattice.influence import Influence
+from indicial.cfd.lattice.instant import Instant
+from indicial.cfd.lattice.wake import SHED_AT, RigidMotion, WakeSheet, steady_wake
+from indicial.conventions import Array
+
+WAKE_SPANS = 30.0
+"""Length over which the helical wake of a steady rotation is followed, in the lattice's largest dimension."""
+
+
+def steady_instant(influence: Influence, motion: RigidMotion, wake_motion: RigidMotion | None = None) -> Instant:
+    """The steady flow of a constant motion; the wake may follow another one (a frozen wake)."""
+    return Instant(
+        influence,
+        motion,
+        np.zeros((3, len(influence.places))),
+        _strips(influence, _wakes(influence, wake_motion or motion)),
+    )
+
+
+def _wakes(influence: Influence, motion: RigidMotion) -> list[WakeSheet]:
+    size = float(np.max(np.ptp(influence.lattice.corners.reshape(-1, 3), axis=0)))
+    first = 0.25 * float(np.min(influence.lattice.strips.chord))
+    return [steady_wake(sheet.nodes[-1], motion, first, WAKE_SPANS * size) for sheet in influence.lattice.sheets]
+
+
+def _strips(influence: Influence, wakes: list[WakeSheet]) -> Array:
+    """Velocities per unit circulation along the whole of a strip's wake, shape (3, n_points, S)."""
+    parts = [influence.strips(wake.nodes, np.ones((1, len(wake.nodes))), wake.far)[0] for wake in wakes]
+    return np.concatenate(parts, axis=-1)
+
+
+class March:
+    """A lattice that moves and sheds its wake.
+
+    ``instant = march.advance(time, motion)``, then ``march.accept(instant.circulation())``, again and again; what comes
+    between is the business of a section model. The first advance, to time 0, is the instant after a jump: the wake is
+    still that of the steady state before.
+
+    Parameters
+    ----------
+    influence : Influence
+    before : RigidMotion
+        The steady motion before.
+    circulation : ndarray
+        Of that steady state (P,).
+    frozen : RigidMotion, optional
+        What the wake follows instead of the body's own motion.
+    """
+
+    def __init__(
+        self, influence: Influence, before: RigidMotion, circulation: Array, frozen: RigidMotion | None = None
+    ) -> None:
+        self._influence = influence
+        self._frozen = frozen
+        self._motion = frozen or before
+        lattice = influence.lattice
+        ends = [0, *accumulate(sheet.columns for sheet in lattice.sheets)]
+        self._columns = [slice(a, b) for a, b in pairwise(ends)]
+        trailing = circulation[lattice.trailing]
+        wakes = _wakes(influence, self._motion)
+        self.wakes = [wake.with_circulation(trailing[at]) for wake, at in zip(wakes, self._columns, strict=True)]
+        self._earlier: list[tuple[float, Array]] = []
+        self._time = 0.0
+
+    @property
+    def circulation(self) -> Array:
+        """Of the panels at the last accepted instant (P,)."""
+        return self._earlier[-1][1]
+
+    def advance(self, time: float, motion: RigidMotion) -> Instant:
+        """Go on to a time [s] and a motion: the wake is left behind, a new row is shed."""
+        step = time - self._time
+        followed = self._frozen or motion
+        near = np.zeros((3, len(self._influence.places), self._influence.lattice.n_strips))
+        if step > 0.0:
+            matrix, shift = self._motion.mean(followed).carried(step)
+            trailing = self.circulation[self._influence.lattice.trailing]
+            wakes = []
+            for wake, sheet, at in zip(self.wakes, self._influence.lattice.sheets, self._columns, strict=True):
+                edge = sheet.nodes[-1]
+                corners = edge - SHED_AT * step * followed.at(edge)
+                wakes.append(wake.carried(matrix, shift).shed(corners, trailing[at]))
+                fresh = np.stack([edge, corners])
+                near[:, :, at] = self._influence.strips(fresh, np.array([[1.0, 0.0]]), wake.far)[0]
+            self.wakes = wakes
+        self._motion, self._time = followed, time
+        older = sum(
+            (self._influence.sheet(wake.nodes, wake.strength, wake.tail, wake.far) for wake in self.wakes),
+            np.zeros((3, len(self._influence.places))),
+        )
+        weight, history = self._difference(time)
+        return Instant(self._influence, motion, older, near, history, weight)
+
+    def accept(self, circulation: Array) -> None:
+        """Keep the circulation (P,) of the instant that was advanced to."""
+        self._earlier = [*self._earlier[-1:], (self._time, circulation)]
+
+    def _difference(self, time: float) -> tuple[float, tuple[tuple[float, Array], ...]]:
+        """Weights of dGamma/dt: second order backwards, first order at the first step, none at the first instant."""
+        if not self._earlier:
+            return 0.0, ()
+        one, last = self._earlier[-1]
+        h = time - one
+        if len(self._earlier) == 1:
+            return 1.0 / h, ((-1.0 / h, last),)
+        two, before = self._earlier[0]
+        g = one - two
+        return (2.0 * h + g) / (h * (h + g)), ((-(h + g) / (h * g), last), (h / (g * (h + g)), before))

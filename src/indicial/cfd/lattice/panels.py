@@ -1,0 +1,348 @@
+r"""Panels of lifting surfaces: bound rings, collocation points, segments and strips.
+
+A ring's front side lies on its panel's quarter chord, its back side on the next panel's; the last one's is the trailing
+edge. The boundary condition holds at three quarters of each panel, midway between its sides. Circulation is positive
+from left to right along the front side, which lifts along the normal. Mesh axes: x aft, y right, z up [m].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from indicial.cfd.lattice.lofting import Loft, Spacing, chord_edges, joined, span_edges, span_middles
+from indicial.cfd.shapes import LiftingSurface, WingSection
+from indicial.cfd.shapes.lifting_surface import check_together
+from indicial.conventions import Array, Index
+from indicial.errors import InputError
+
+_MIRROR = np.array([1.0, -1.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Strips:
+    """What a section model needs to know of each chordwise row of panels, n in all, from left to right.
+
+    Parameters
+    ----------
+    surface : tuple of str
+    chord, width, area : ndarray
+        [m], [m], [m^2], shape (n,). The width is measured across the flow, along the surface.
+    quarter_chord, three_quarter_chord : ndarray
+        Points [m], shape (n, 3).
+    aft, up, span : ndarray
+        Unit vectors along the twisted chord, across chord and span, and along the span (to the right), shape (n, 3).
+    sections : tuple
+        (inner section, outer section, weight of the outer one) of each strip.
+    """
+
+    surface: tuple[str, ...]
+    chord: Array
+    width: Array
+    area: Array
+    quarter_chord: Array
+    three_quarter_chord: Array
+    aft: Array
+    up: Array
+    span: Array
+    sections: tuple[tuple[WingSection, WingSection, float], ...]
+
+    def __len__(self) -> int:
+        return len(self.chord)
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """One surface in one piece: rows from the leading edge, columns from left to right.
+
+    Parameters
+    ----------
+    name : str
+    nodes : ndarray
+        Corners of the bound rings (rows + 1, columns + 1, 3); the last row is the trailing edge.
+    edges : ndarray
+        Corners of the panels, for pictures and areas, same shape.
+    collocation, normal : ndarray
+        Shape (rows, columns, 3).
+    front : ndarray
+        Points on the front sides of the rings where their wind is taken, same shape.
+    strips : Strips
+    """
+
+    name: str
+    nodes: Array
+    edges: Array
+    collocation: Array
+    normal: Array
+    front: Array
+    strips: Strips
+
+    @property
+    def rows(self) -> int:
+        """Panels along the chord."""
+        return len(self.collocation)
+
+    @property
+    def columns(self) -> int:
+        """Panels across."""
+        return int(self.collocation.shape[1])
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """All panels, P of them in S strips, sheet after sheet, row after row.
+
+    `Lattice.of` makes one.
+    """
+
+    surfaces: tuple[LiftingSurface, ...]
+    sheets: tuple[Sheet, ...]
+
+    @classmethod
+    def of(
+        cls,
+        surfaces: LiftingSurface | Sequence[LiftingSurface],
+        *,
+        chordwise: int | Mapping[str, int] = 6,
+        spanwise: int | Mapping[str, int] = 20,
+        chord_spacing: Spacing = "equal",
+        span_spacing: Spacing = "cosine",
+    ) -> Lattice:
+        """Cut surfaces into panels.
+
+        Parameters
+        ----------
+        chordwise, spanwise : int or mapping by the surface's name
+            Panels along the chord, and across half a symmetric surface or the whole of another.
+        chord_spacing, span_spacing : {"cosine", "equal"}
+            Equal panels along the chord are second order in time too; cosine ones resolve a cambered nose.
+        """
+        listed = (surfaces,) if isinstance(surfaces, LiftingSurface) else tuple(surfaces)
+        check_together(listed)
+        sheets: list[Sheet] = []
+        for surface in listed:
+            u = chord_edges(_count(chordwise, surface.name, "chordwise"), chord_spacing)
+            places = span_edges(surface, _count(spanwise, surface.name, "spanwise"), span_spacing)
+            sheets += _sheets(surface, u, places, span_spacing)
+        return cls(listed, tuple(sheets))
+
+    @cached_property
+    def n_panels(self) -> int:
+        """P."""
+        return len(self.normal)
+
+    @cached_property
+    def n_strips(self) -> int:
+        """S."""
+        return sum(sheet.columns for sheet in self.sheets)
+
+    @cached_property
+    def collocation(self) -> Array:
+        """Shape (P, 3)."""
+        return np.concatenate([sheet.collocation.reshape(-1, 3) for sheet in self.sheets])
+
+    @cached_property
+    def normal(self) -> Array:
+        """Unit normals at the collocation points, shape (P, 3)."""
+        return np.concatenate([sheet.normal.reshape(-1, 3) for sheet in self.sheets])
+
+    @cached_property
+    def corners(self) -> Array:
+        """Of the bound rings: front left, front right, back right, back left, shape (P, 4, 3)."""
+        rings = []
+        for sheet in self.sheets:
+            n = sheet.nodes
+            rings.append(np.stack([n[:-1, :-1], n[:-1, 1:], n[1:, 1:], n[1:, :-1]], axis=2).reshape(-1, 4, 3))
+        return np.concatenate(rings)
+
+    @cached_property
+    def ring_area(self) -> Array:
+        """Area vectors of the rings [m^2], along the normal, shape (P, 3)."""
+        c = self.corners
+        return np.asarray(0.5 * np.cross(c[:, 2] - c[:, 0], c[:, 1] - c[:, 3]))
+
+    @cached_property
+    def ring_centre(self) -> Array:
+        """Shape (P, 3)."""
+        return np.asarray(np.mean(self.corners, axis=1))
+
+    @cached_property
+    def numbers(self) -> tuple[Index, ...]:
+        """Panel numbers of each sheet, shape (rows, columns)."""
+        first, found = 0, []
+        for sheet in self.sheets:
+            size = sheet.rows * sheet.columns
+            found.append(np.arange(first, first + size).reshape(sheet.rows, sheet.columns))
+            first += size
+        return tuple(found)
+
+    @cached_property
+    def strip(self) -> Index:
+        """Strip of each panel, shape (P,)."""
+        first, found = 0, []
+        for sheet in self.sheets:
+            found.append(np.tile(np.arange(first, first + sheet.columns), sheet.rows))
+            first += sheet.columns
+        return np.concatenate(found)
+
+    @cached_property
+    def trailing(self) -> Index:
+        """The panel at the trailing edge of each strip, shape (S,)."""
+        return np.concatenate([numbers[-1] for numbers in self.numbers])
+
+    @cached_property
+    def ahead(self) -> Index:
+        """The panel in front of each; itself number P for the first ones, shape (P,)."""
+        found = [np.concatenate([np.full((1, n.shape[1]), self.n_panels), n[:-1]]).ravel() for n in self.numbers]
+        return np.concatenate(found)
+
+    @cached_property
+    def across(self) -> tuple[Array, Array]:
+        """Places of the wind, and vectors, of the front sides of the rings, from left to right, shapes (P, 3)."""
+        c = self.corners
+        return np.concatenate([sheet.front.reshape(-1, 3) for sheet in self.sheets]), c[:, 1] - c[:, 0]
+
+    @cached_property
+    def along(self) -> tuple[Array, Array]:
+        """Middles and vectors of the sides between rings, from front to back, shapes (E, 3)."""
+        fronts = np.concatenate([sheet.nodes[:-1].reshape(-1, 3) for sheet in self.sheets])
+        backs = np.concatenate([sheet.nodes[1:].reshape(-1, 3) for sheet in self.sheets])
+        return 0.5 * (fronts + backs), backs - fronts
+
+    @cached_property
+    def beside(self) -> tuple[Index, Index]:
+        """Panels on the left and right of each side in `along`; P where there is none, shapes (E,)."""
+        lefts, rights = [], []
+        for n in self.numbers:
+            none = np.full((n.shape[0], 1), self.n_panels)
+            lefts.append(np.hstack([none, n]).ravel())
+            rights.append(np.hstack([n, none]).ravel())
+        return np.concatenate(lefts), np.concatenate(rights)
+
+    @cached_property
+    def strips(self) -> Strips:
+        """All strips in one."""
+        parts = [sheet.strips for sheet in self.sheets]
+
+        def joined_field(name: str) -> Array:
+            return np.concatenate([getattr(part, name) for part in parts])
+
+        vectors = ("chord", "width", "area", "quarter_chord", "three_quarter_chord", "aft", "up", "span")
+        return Strips(
+            surface=tuple(name for part in parts for name in part.surface),
+            **{name: joined_field(name) for name in vectors},
+            sections=tuple(one for part in parts for one in part.sections),
+        )
+
+    def summary(self) -> str:
+        """One line: surfaces and panels."""
+        parts = ", ".join(f"{sheet.name} {sheet.rows} x {sheet.columns}" for sheet in self.sheets)
+        return f"{self.n_panels} panels ({parts})"
+
+
+def _count(counts: int | Mapping[str, int], name: str, what: str) -> int:
+    value = counts.get(name) if isinstance(counts, Mapping) else counts
+    if not (isinstance(value, int | np.integer) and value >= 1):
+        raise InputError(f"{what} panels of surface {name!r} are {value}, must be a whole number of at least 1")
+    return int(value)
+
+
+def _sheets(surface: LiftingSurface, u: Array, places: Array, spacing: Spacing) -> list[Sheet]:
+    """One sheet, or two where a gap parts the halves."""
+    right = _sheet(surface, u, places, spacing)
+    if not surface.symmetric:
+        return [right]
+    left = _mirrored(right)
+    return [_side_by_side(left, right)] if joined(surface) else [left, right]
+
+
+def _sheet(surface: LiftingSurface, u: Array, places: Array, spacing: Spacing) -> Sheet:
+    """The stations as they are listed."""
+    middles_at = span_middles(surface, places, spacing)
+    cuts, middles = Loft.at(surface, places), Loft.at(surface, middles_at)
+    steps = np.diff(u)
+    nodes = cuts.points(np.append(u[:-1] + 0.25 * steps, 1.0))
+    share = ((middles_at - places[:-1]) / np.diff(places))[:, None]
+    front = (1.0 - share) * nodes[:-1, :-1] + share * nodes[:-1, 1:]
+    control = u[:-1] + 0.75 * steps
+    between = cuts.points(control)
+    across = between[:, 1:] - between[:, :-1]
+    normal = np.cross(middles.tangents(control), across)
+    normal /= np.linalg.norm(normal, axis=-1)[..., None]
+    edges = cuts.points(u)
+    diagonals = np.cross(edges[1:, 1:] - edges[:-1, :-1], edges[:-1, 1:] - edges[1:, :-1])
+    width = np.diff(places)
+    aft, up = middles.axes()
+    strips = Strips(
+        surface=(surface.name,) * len(width),
+        chord=middles.chord,
+        width=width,
+        area=0.5 * np.sum(np.linalg.norm(diagonals, axis=-1), axis=0),
+        quarter_chord=middles.quarter_chord,
+        three_quarter_chord=middles.quarter_chord + 0.5 * middles.chord[:, None] * aft,
+        aft=aft,
+        up=up,
+        span=np.cross(up, aft),
+        sections=tuple(middles.sections(n) for n in range(len(width))),
+    )
+    return Sheet(surface.name, nodes, edges, middles.points(control), normal, front, strips)
+
+
+def _mirrored(sheet: Sheet) -> Sheet:
+    """Behind the plane y = 0, from left to right again."""
+    s = sheet.strips
+
+    def turned(values: Array) -> Array:
+        return np.asarray(values[:, ::-1] * _MIRROR)
+
+    def flipped(values: Array) -> Array:
+        return np.asarray(values[::-1] * _MIRROR)
+
+    strips = Strips(
+        surface=s.surface,
+        chord=s.chord[::-1],
+        width=s.width[::-1],
+        area=s.area[::-1],
+        quarter_chord=flipped(s.quarter_chord),
+        three_quarter_chord=flipped(s.three_quarter_chord),
+        aft=flipped(s.aft),
+        up=flipped(s.up),
+        span=-flipped(s.span),
+        sections=s.sections[::-1],
+    )
+    return Sheet(
+        sheet.name,
+        turned(sheet.nodes),
+        turned(sheet.edges),
+        turned(sheet.collocation),
+        turned(sheet.normal),
+        turned(sheet.front),
+        strips,
+    )
+
+
+def _side_by_side(left: Sheet, right: Sheet) -> Sheet:
+    """Two halves that share their root."""
+
+    def both(a: Array, b: Array, axis: int = 1) -> Array:
+        return np.concatenate([a, b], axis=axis)
+
+    one, two = left.strips, right.strips
+    vectors = ("chord", "width", "area", "quarter_chord", "three_quarter_chord", "aft", "up", "span")
+    strips = Strips(
+        surface=one.surface + two.surface,
+        **{name: both(getattr(one, name), getattr(two, name), 0) for name in vectors},
+        sections=one.sections + two.sections,
+    )
+    return Sheet(
+        left.name,
+        both(left.nodes, right.nodes[:, 1:]),
+        both(left.edges, right.edges[:, 1:]),
+        both(left.collocation, right.collocation),
+        both(left.normal, right.normal),
+        both(left.front, right.front),
+        strips,
+    )

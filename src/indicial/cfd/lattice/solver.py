@@ -1,0 +1,169 @@
+r"""The unsteady vortex lattice behind the solver protocol: motion in, history out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from indicial import __version__
+from indicial.cfd.lattice.influence import Influence
+from indicial.cfd.lattice.instant import Instant, StripLoads
+from indicial.cfd.lattice.march import March, steady_instant
+from indicial.cfd.lattice.panels import Lattice
+from indicial.cfd.lattice.wake import RigidMotion, WakeModel
+from indicial.conventions import Array, ReferenceQuantities, mesh_from_body
+from indicial.errors import InputError
+from indicial.history import History
+from indicial.motion import FlightCondition, Motion, Rates
+from indicial.solver import SteadyLoads
+
+_SOLVER = "unsteady vortex lattice"
+
+
+@dataclass(frozen=True)
+class LatticeSettings:
+    """How the lattice is solved.
+
+    Parameters
+    ----------
+    wake : {"shed", "frozen"}
+        Left in still air where the body was (helical in a steady rotation), or carried along the stream of the
+        flight condition, as in linear theory.
+    compressible : bool
+        Whether the Mach number counts (Prandtl and Glauert's rule, up to M 0.7).
+    core : float
+        Radius of the wake's cores over the reference length: what a tail feels in a wake that cuts it.
+    """
+
+    wake: WakeModel = "shed"
+    compressible: bool = True
+    core: float = 1e-3
+
+    def __post_init__(self) -> None:
+        if self.wake not in ("shed", "frozen"):
+            raise InputError(f"wake is {self.wake!r}, must be 'shed' or 'frozen'")
+        if not (np.isfinite(self.core) and self.core >= 0.0):
+            raise InputError(f"core is {self.core}, must be finite and at least 0")
+
+
+class LatticeSolver:
+    """Inviscid attached flow about lifting surfaces.
+
+    Parameters
+    ----------
+    lattice : Lattice
+    reference : ReferenceQuantities
+        Of loads, moments and rates.
+    settings : LatticeSettings, optional
+    """
+
+    def __init__(
+        self, lattice: Lattice, reference: ReferenceQuantities, settings: LatticeSettings = LatticeSettings()
+    ) -> None:
+        self.lattice = lattice
+        self.settings = settings
+        self._reference = reference
+        self._influence = lru_cache(maxsize=4)(self._influence_at)
+
+    @property
+    def reference(self) -> ReferenceQuantities:
+        """What the loads are made dimensionless with."""
+        return self._reference
+
+    def influence(self, condition: FlightCondition) -> Influence:
+        """What panels induce on one another at a flight condition."""
+        return self._influence(condition.mach if self.settings.compressible else 0.0)
+
+    def _influence_at(self, mach: float) -> Influence:
+        return Influence.of(self.lattice, mach, self.settings.core * self._reference.length)
+
+    def motion(self, velocity: ArrayLike, rate: ArrayLike) -> RigidMotion:
+        """Mesh axes, from V_b [m/s] and omega [rad/s] in body axes.
+
+        Raises
+        ------
+        InputError
+            If they are not finite.
+        """
+        v, w = mesh_from_body(velocity), mesh_from_body(rate)
+        if not (np.all(np.isfinite(v)) and np.all(np.isfinite(w))):
+            raise InputError(f"the motion is not finite: velocity {v} m/s, rate {w} rad/s in mesh axes")
+        return RigidMotion(v, w, np.asarray(self._reference.moment_reference, dtype=float))
+
+    def frozen(self, condition: FlightCondition) -> RigidMotion | None:
+        """What a frozen wake follows; None for one that is shed."""
+        return self.motion(condition.velocity, np.zeros(3)) if self.settings.wake == "frozen" else None
+
+    def steady(self, condition: FlightCondition, rates: Rates = Rates()) -> SteadyLoads:
+        """Loads of the steady state at constant velocity and body rates.
+
+        Raises
+        ------
+        InputError
+            If the Mach number is beyond the linear rule.
+        """
+        motion = self.motion(condition.velocity, rates.as_array())
+        instant = steady_instant(self.influence(condition), motion, self.frozen(condition))
+        loads = self.coefficients(instant.loads(instant.circulation()), condition)
+        return SteadyLoads(loads, condition, rates, self._reference, dict(self._provenance()))
+
+    def unsteady(self, condition: FlightCondition, motion: Motion, times: ArrayLike) -> History:
+        r"""Loads at `times` [s], which are the steps of the march too.
+
+        A jump of the motion at t = 0 gives an incompressible flow an impulse (its added mass), which no instant's loads
+        can show. It is returned as a compressible flow spreads it, over a short while: the loads at t = 0+ have it as a
+        triangle that is gone at ``times[1]``, so that integrals of the history over time are right. All else at t = 0+
+        is the limit from later times.
+        """
+        t = np.asarray(times, dtype=float)
+        if t.ndim != 1 or t.size < 1 or t[0] != 0.0 or np.any(np.diff(t) <= 0.0) or not np.all(np.isfinite(t)):
+            raise InputError("times must be finite, start at 0 and increase")
+        influence, frozen = self.influence(condition), self.frozen(condition)
+        before = self.motion(motion.velocity_before, motion.rate_before)
+        start = steady_instant(influence, before, frozen)
+        settled = start.circulation()
+        march = March(influence, before, settled, frozen)
+        velocity, rate = motion.velocity(t), motion.rate(t)
+        loads = np.empty((t.size, 6))
+        kept: list[tuple[Instant, Array]] = []
+        for n in range(t.size):
+            instant = march.advance(float(t[n]), self.motion(velocity[n], rate[n]))
+            circulation = instant.circulation()
+            march.accept(circulation)
+            loads[n] = self.coefficients(instant.loads(circulation), condition)
+            kept = [*kept, (instant, circulation)] if n < 2 else kept
+        if t.size > 1:
+            (first, after_jump), (_, later) = kept
+            changing = (2.0 * (after_jump - settled) + later - after_jump) / t[1]
+            loads[0] = self.coefficients(first.loads(after_jump, changing), condition)
+        return History(
+            time=t,
+            coefficients=loads,
+            velocity=velocity,
+            rate=rate,
+            before=self.coefficients(start.loads(settled), condition),
+            condition=condition,
+            reference=self._reference,
+            motion=motion.describe(),
+            provenance=self._provenance(),
+        )
+
+    def coefficients(self, loads: StripLoads, condition: FlightCondition) -> Array:
+        """The six coefficients of all strips together, shape (6,)."""
+        force, moment = loads.total
+        moment = mesh_from_body(moment) / self._reference.moment_lengths
+        out: Array = np.concatenate([force, moment]) / (0.5 * condition.speed**2 * self._reference.area)
+        return out
+
+    def _provenance(self) -> dict[str, Any]:
+        return {
+            "solver": _SOLVER,
+            "version": __version__,
+            "panels": self.lattice.n_panels,
+            "wake": self.settings.wake,
+            "compressible": int(self.settings.compressible),
+        }

@@ -1,0 +1,1 @@
+"""The unsteady vortex lattice against exact theory."""
