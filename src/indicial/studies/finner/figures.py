@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from indicial.reference_data import finner_arl, finner_range, read_table
 from indicial.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, figure_style, save, symbol
 from indicial.studies.finner.agreement import SUM
 from indicial.studies.finner.axial_force import axial_force
+from indicial.studies.finner.flow_pictures import shock_pattern, surface_pressure
+from indicial.studies.finner.load_pictures import hysteresis, step_responses, time_step
 from indicial.studies.finner.pieces import LEVELS, OVERLAP
 from indicial.studies.finner.selection import OTHER_MOMENT_REFERENCE, about, convergence, derivative, finest, suitable
 from indicial.studies.finner.variants import FINNER
@@ -35,6 +37,10 @@ def draw(results: Results, folder: Path) -> tuple[Path, ...]:
         for name, make in _FIGURES.items():
             figure = make(results, plt.subplots)
             paths.append(save(figure, folder / f"{name}.png"))
+        for name, draw_picture in _PICTURES.items():
+            picture = draw_picture(results, plt)
+            if picture is not None:
+                paths.append(save(picture, folder / f"{name}.png"))
     return tuple(paths)
 
 
@@ -241,3 +247,12 @@ _FIGURES: dict[str, Callable[[Results, _Canvas], Figure]] = {
     "refinement": _refinement,
     "transonic": _transonic,
 }
+
+_PICTURES: dict[str, Callable[[Results, Any], Figure | None]] = {
+    "surface_pressure": surface_pressure,
+    "shock_pattern": shock_pattern,
+    "hysteresis": hysteresis,
+    "step_responses": step_responses,
+    "time_step": time_step,
+}
+"""Pictures of flows and histories; None where nothing to draw from is kept."""

@@ -122,8 +122,6 @@ def _halved_step() -> list[Piece]:
 SHOWN = (1.2, 2.0, 4.0)
 """Mach numbers of the pictures."""
 
-LOOP = {"amplitude_deg": 0.5, "periods": 2, "steps_per_period": 120}
-
 STEPS_PER_PERIOD = {0.3: 420, 0.2: 628, 0.1: 1256, 0.05: 2514}
 """Steps of a period at k = 0.025 by U dt/d, within 0.3% (a period is 125.7 d/U); 0.3 and 0.05 as published."""
 
@@ -138,10 +136,11 @@ def _shown() -> list[Piece]:
         kind = _kind(mach)
         listed.append(_piece("field", kind, "medium", mach, alpha_deg=0.0, q=0.01))
         listed += [
-            _piece(f"loop_k{k:g}", kind, "coarse", mach, **LOOP, motion="pitch", k=k) for k in REDUCED_FREQUENCIES
+            _piece(f"loop_k{k:g}", kind, "quick", mach, **{**FORCED, "k": k}, motion="pitch")
+            for k in REDUCED_FREQUENCIES
         ]
         end = 160.0 if mach < 1.4 else 60.0
-        listed.append(_piece("steps", kind, "coarse", mach, **STEP, end=end, largest=0.5))
+        listed.append(_piece("steps", kind, "quick", mach, **STEP, end=end, largest=0.5))
     return listed
 
 
