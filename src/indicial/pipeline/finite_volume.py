@@ -15,6 +15,7 @@ from indicial.motion import AlphaStep, FlightCondition, PitchRateStep
 from indicial.pipeline.folder import digest
 from indicial.pipeline.pool import Fraction
 from indicial.report.space import FlowPicture
+from indicial.rom.modal import ModalForm
 from indicial.rom.simulation import simulate
 
 
@@ -71,7 +72,11 @@ def compile_kernels() -> None:
     A disturbed box of a few cells goes through a steady state and two unsteady steps, and is linearised; one lag state
     takes a step.
     """
-    simulate(-np.ones((1, 1)), np.ones((1, 1)), np.array([0.0, 1.0]), np.ones((2, 1)), np.zeros(1))
+    one, two = np.ones((1, 1)), np.array([0.0, 1.0])
+    simulate(-one, one, two, np.ones((2, 1)), np.zeros(1))
+    lag = ModalForm.of(-one, one, one, one)
+    if lag is not None:
+        lag.respond(two, np.ones((2, 1)), np.zeros(1))
     condition = FlightCondition(2.0)
     reference = ReferenceQuantities(1.0, 1.0)
     solver = FiniteVolumeSolver(box_mesh((3, 3, 3)), reference, FlowSettings(1e-2, 2, 0.5))

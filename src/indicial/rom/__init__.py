@@ -10,6 +10,7 @@ from indicial.rom.quasi_steady import QuasiSteadyError, QuasiSteadyModel, quasi_
 from indicial.rom.realisation import realise
 from indicial.rom.response import StepResponse, StepResponses
 from indicial.rom.state_space import Candidate, ChannelError, StateSpaceModel
+from indicial.rom.streaming import Stream, advance, stream
 
 __all__ = [
     "Candidate",
@@ -27,6 +28,8 @@ __all__ = [
     "StateSpaceModel",
     "StepResponse",
     "StepResponses",
+    "Stream",
+    "advance",
     "check_prediction",
     "deficiency",
     "deficiency_integral",
@@ -34,4 +37,5 @@ __all__ = [
     "project",
     "quasi_steady_error",
     "realise",
+    "stream",
 ]

@@ -15,6 +15,7 @@ from indicial.conventions import COEFFICIENTS, Array, ReferenceQuantities
 from indicial.errors import InputError
 from indicial.files import read_netcdf, write_netcdf, write_text
 from indicial.motion import FlightCondition
+from indicial.rom.modal import ModalForm
 from indicial.rom.model import ComplexArray, ReducedModel
 from indicial.rom.response import StepResponse, StepResponses
 from indicial.rom.signals import MotionInputs
@@ -135,6 +136,26 @@ class StateSpaceModel(ReducedModel):
         return values[np.lexsort((values.imag, -values.real))]
 
     @cached_property
+    def _modes(self) -> ModalForm | None:
+        return ModalForm.of(self.a, self.b, self.c, self.d)
+
+    def modes(self) -> ModalForm:
+        """The model as first-order recurrences, one for each real pole or conjugate pair.
+
+        Raises
+        ------
+        InputError
+            If poles coincide without an eigenvector each: such a model has no modal form.
+        """
+        if self._modes is None:
+            poles = ", ".join(_pole_text(pole) for pole in self.poles if pole.imag >= 0.0)
+            raise InputError(
+                f"the model has no modal form: of its poles {poles} some nearly share an eigenvector; "
+                "part them a little, or realise the model with another order"
+            )
+        return self._modes
+
+    @cached_property
     def system(self) -> control.StateSpace:
         """The model as a `control.StateSpace` in reduced time, inputs and outputs named."""
         import control
@@ -165,7 +186,12 @@ class StateSpaceModel(ReducedModel):
         return np.asarray(self.d + self.c @ states, dtype=np.complex128)
 
     def respond(self, inputs: MotionInputs) -> Array:
-        """Loads less `baseline` under `inputs`, exact for inputs linear between samples, shape (n, n_outputs)."""
+        """Loads less `baseline` under `inputs`, exact for inputs linear between samples, shape (n, n_outputs).
+
+        In modal form, or by matrix exponentials where there is none.
+        """
+        if self._modes is not None:
+            return self._modes.respond(inputs.s, inputs.values, inputs.before)[:: inputs.stride]
         start = np.asarray(-np.linalg.solve(self.a, self.b @ inputs.before), dtype=float)
         states = simulate(self.a, self.b, inputs.s, inputs.values, start)[:: inputs.stride]
         loads: Array = states @ self.c.T + inputs.values[:: inputs.stride] @ self.d.T
