@@ -1,5 +1,6 @@
 """Reduced-order models: step responses in, loads under any motion out; each model is a `Solver`."""
 
+from indicial.rom.balancing import Truncation, truncate
 from indicial.rom.check import CheckedCoefficient, PredictionCheck, check_prediction
 from indicial.rom.convolution import ConvolutionModel
 from indicial.rom.deficiency import DeficiencyIntegral, deficiency, deficiency_integral
@@ -29,6 +30,7 @@ __all__ = [
     "StepResponse",
     "StepResponses",
     "Stream",
+    "Truncation",
     "advance",
     "check_prediction",
     "deficiency",
@@ -38,4 +40,5 @@ __all__ = [
     "quasi_steady_error",
     "realise",
     "stream",
+    "truncate",
 ]

@@ -34,6 +34,7 @@ _RACE = 8
 """Evaluations after which orders are compared; the chosen one is refined to the end."""
 _UNEVEN = 1e-6
 _FEWEST_SAMPLES = 40
+_THINNED = (1, 2, 4, 8)
 _LONGEST_MEMORY, _MOST_MARKOV = 40, 200
 _FASTEST = 5.0  # decays and turns between two samples that these can show
 
@@ -132,17 +133,16 @@ def _tried(
 ) -> tuple[list[ModalSystem], list[Candidate]]:
     """Systems fitted to the first part of the records, and their errors over the last."""
     training = [_training(record) for record in records]
-    markov = _markov(training, scale, max_order if order is None else order)
+    markov = _markov(training, scale, step, max_order if order is None else order)
     systems: list[ModalSystem] = []
     candidates: list[Candidate] = []
     for n in range(1, max_order + 1) if order is None else (order,):
-        modes, c = _modal(era(markov, n), step)
-        if modes.order == 0:
+        start = _start(markov, n, training, scale, direct)
+        if start is None:
             continue
-        start = fit_inputs(modes, c * scale[:, None], training, scale, direct)
         system = refine(start, training, scale, free_direct=direct is None, evaluations=_RACE)
         systems.append(system)
-        candidates.append(Candidate("", METHOD, modes.order, _held_out(system, records, training, scale)))
+        candidates.append(Candidate("", METHOD, system.modes.order, _held_out(system, records, training, scale)))
         errors = [candidate.held_out for candidate in candidates]
         if len(errors) > 4 and min(errors[-3:]) > 0.98 * min(errors[:-3]):
             break
@@ -151,16 +151,47 @@ def _tried(
     return systems, candidates
 
 
-def _markov(training: list[Record], scale: Array, order: int) -> Array:
-    """Markov parameters of the part to be fitted, outputs scaled."""
-    cut = [int(np.count_nonzero(record.weights)) for record in training]
-    u = [r.inputs.values[:: r.inputs.stride][:n] for r, n in zip(training, cut, strict=True)]
-    y = [r.loads[:n] / scale for r, n in zip(training, cut, strict=True)]
-    m, p = u[0].shape[1], y[0].shape[1]
-    # four samples for every coefficient at the least
-    memory = min(_LONGEST_MEMORY, max(2, (sum(cut) // 4 - m) // (m + p)))
-    count = min(_MOST_MARKOV, max(min(cut), 4 * order))
-    return system_markov(*observer_markov(u, y, memory), count)
+def _markov(training: list[Record], scale: Array, step: float, order: int) -> list[tuple[float, Array]]:
+    """Time steps, and Markov parameters of the part to be fitted at these, outputs scaled.
+
+    Slow motions sampled closely tell an observer little more than that loads are smooth: of these every other
+    sample, every fourth, ... says more.
+    """
+    found = []
+    for every in _THINNED:
+        cut = [int(np.count_nonzero(record.weights)) for record in training]
+        u = [r.inputs.values[:: r.inputs.stride][:n:every] for r, n in zip(training, cut, strict=True)]
+        y = [r.loads[:n:every] / scale for r, n in zip(training, cut, strict=True)]
+        m, p, count = u[0].shape[1], y[0].shape[1], sum(len(one) for one in y)
+        # four samples for every coefficient at the least
+        memory = min(_LONGEST_MEMORY, (count // 4 - m) // (m + p))
+        if memory < max(2, order // p) and every > 1:
+            break
+        markov = observer_markov(u, y, max(2, memory))
+        found.append((every * step, system_markov(*markov, min(_MOST_MARKOV, max(count, 4 * order)))))
+    return found
+
+
+def _start(
+    markov: list[tuple[float, Array]], order: int, training: list[Record], scale: Array, direct: Array | None
+) -> ModalSystem | None:
+    """The system of least error of those that ERA finds from each of the Markov parameters; None if none decays."""
+    best, least = None, np.inf
+    for step, parameters in markov:
+        modes, c = _modal(era(parameters, order), step)
+        if modes.order == 0:
+            continue
+        system = fit_inputs(modes, c * scale[:, None], training, scale, direct)
+        misfit = sum(float(np.sum(one.weights[:, None] * _misfit(system, one, scale) ** 2)) for one in training)
+        if misfit < least:
+            best, least = system, misfit
+    return best
+
+
+def _misfit(system: ModalSystem, record: Record, scale: Array) -> Array:
+    """Error of every load, shape (n, n_outputs)."""
+    wrong: Array = (system.respond(record.inputs) - record.loads) / scale
+    return wrong
 
 
 def _modal(sampled: Sampled, step: float) -> tuple[Modes, Array]:
@@ -175,7 +206,7 @@ def _modal(sampled: Sampled, step: float) -> tuple[Modes, Array]:
     for i in first:
         seen = sampled.c @ vectors[:, i]
         columns += [seen.real] if real[i] else [seen.real, seen.imag]
-    return modes, np.array(columns).reshape(modes.order, -1).T
+    return modes, np.array(columns).reshape(modes.order, len(sampled.c)).T
 
 
 def _held_out(system: ModalSystem, records: list[Record], training: list[Record], scale: Array) -> float:
@@ -183,7 +214,7 @@ def _held_out(system: ModalSystem, records: list[Record], training: list[Record]
     error = size = 0.0
     for record, trained in zip(records, training, strict=True):
         unseen = trained.weights == 0.0
-        error += float(np.sum(((system.respond(record.inputs) - record.loads)[unseen] / scale) ** 2))
+        error += float(np.sum(_misfit(system, record, scale)[unseen] ** 2))
         size += float(np.sum((record.loads[unseen] / scale) ** 2))
     return float(np.sqrt(error / size)) if size > 0.0 else np.inf
 

@@ -182,8 +182,8 @@ def nest(stable: Reduced, k_max: float, scale: Array) -> Nested:
     """
     outputs = np.max(scale, axis=1)
     inputs = np.max(scale / outputs[:, None], axis=0)
-    excited = _factor(_gramian(stable.a, stable.b / inputs))
-    seen = _factor(_gramian(stable.a.T, (stable.c / outputs[:, None]).T))
+    excited = gramian_factor(stable.a, stable.b / inputs)
+    seen = gramian_factor(stable.a.T, (stable.c / outputs[:, None]).T)
     left, hankel, right = np.linalg.svd(seen.T @ excited)
     hankel = hankel[hankel > _HANKEL_RANK * np.max(hankel, initial=0.0)]
     # the observability Gramian is the identity, the other one hankel^2
@@ -235,7 +235,7 @@ def _gramian(a: Array, b: Array) -> Array:
     return np.asarray((p + p.T) / 2.0)
 
 
-def _factor(gramian: Array) -> Array:
-    """L with ``L L^T`` the positive semidefinite `gramian`."""
-    values, vectors = np.linalg.eigh(gramian)
+def gramian_factor(a: Array, b: Array) -> Array:
+    """L with ``P = L L^T`` and ``A P + P A^T = -B B^T``, for A stable."""
+    values, vectors = np.linalg.eigh(_gramian(a, b))
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
