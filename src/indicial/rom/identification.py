@@ -19,7 +19,7 @@ from indicial.conventions import COEFFICIENTS, Array
 from indicial.errors import InputError
 from indicial.history import History
 from indicial.rom.era import Sampled, era, stable_modes
-from indicial.rom.modal_system import ModalSystem, Record, fit_inputs, refine
+from indicial.rom.modal_system import ModalSystem, Record, fit_inputs, fit_rank_one, refine
 from indicial.rom.modes import Modes
 from indicial.rom.okid import observer_markov, system_markov
 from indicial.rom.signals import INPUTS, MotionInputs, check_names
@@ -35,6 +35,8 @@ _RACE = 8
 _UNEVEN = 1e-6
 _FEWEST_SAMPLES = 40
 _THINNED = (1, 2, 4, 8)
+_CUTOFFS = (1e-11, 1e-4)
+_SLOWEST = 5.0  # time constants in a record
 _LONGEST_MEMORY, _MOST_MARKOV = 40, 200
 _FASTEST = 5.0  # decays and turns between two samples that these can show
 
@@ -137,10 +139,10 @@ def _tried(
     systems: list[ModalSystem] = []
     candidates: list[Candidate] = []
     for n in range(1, max_order + 1) if order is None else (order,):
-        start = _start(markov, n, training, scale, direct)
-        if start is None:
-            continue
-        system = refine(start, training, scale, free_direct=direct is None, evaluations=_RACE)
+        starts = _starts(markov, n, training, scale, direct)
+        free = direct is None
+        race = [refine(start, training, scale, free_direct=free, evaluations=_RACE) for start in starts]
+        system = min(race, key=lambda one: _misfit(one, training, scale))
         systems.append(system)
         candidates.append(Candidate("", METHOD, system.modes.order, _held_out(system, records, training, scale)))
         errors = [candidate.held_out for candidate in candidates]
@@ -167,31 +169,37 @@ def _markov(training: list[Record], scale: Array, step: float, order: int) -> li
         memory = min(_LONGEST_MEMORY, (count // 4 - m) // (m + p))
         if memory < max(2, order // p) and every > 1:
             break
-        markov = observer_markov(u, y, max(2, memory))
-        found.append((every * step, system_markov(*markov, min(_MOST_MARKOV, max(count, 4 * order)))))
+        length = min(_MOST_MARKOV, max(count, 4 * order))
+        for cutoff in _CUTOFFS:
+            observer = observer_markov(u, y, max(2, memory), cutoff)
+            found.append((every * step, system_markov(*observer, length)))
     return found
 
 
-def _start(
+def _starts(
     markov: list[tuple[float, Array]], order: int, training: list[Record], scale: Array, direct: Array | None
-) -> ModalSystem | None:
-    """The system of least error of those that ERA finds from each of the Markov parameters; None if none decays."""
-    best, least = None, np.inf
+) -> list[ModalSystem]:
+    """Of the systems that ERA finds the two of least error, and one with real poles spread over the record."""
+    found = []
     for step, parameters in markov:
         modes, c = _modal(era(parameters, order), step)
-        if modes.order == 0:
-            continue
-        system = fit_inputs(modes, c * scale[:, None], training, scale, direct)
-        misfit = sum(float(np.sum(one.weights[:, None] * _misfit(system, one, scale) ** 2)) for one in training)
-        if misfit < least:
-            best, least = system, misfit
-    return best
+        if modes.order > 0:
+            found.append(fit_inputs(modes, c * scale[:, None], training, scale, direct))
+    found.sort(key=lambda one: _misfit(one, training, scale))
+    longest = max(float(record.inputs.s[-1]) for record in training)
+    spread = Modes(np.geomspace(_SLOWEST / longest, 1.0 / markov[0][0], order + 2)[1:-1], np.zeros((0, 2)))
+    return [*found[:2], fit_rank_one(spread, training, scale, direct)]
 
 
-def _misfit(system: ModalSystem, record: Record, scale: Array) -> Array:
+def _errors(system: ModalSystem, record: Record, scale: Array) -> Array:
     """Error of every load, shape (n, n_outputs)."""
     wrong: Array = (system.respond(record.inputs) - record.loads) / scale
     return wrong
+
+
+def _misfit(system: ModalSystem, training: list[Record], scale: Array) -> float:
+    """Squared error over what is to be fitted."""
+    return sum(float(np.sum(one.weights[:, None] * _errors(system, one, scale) ** 2)) for one in training)
 
 
 def _modal(sampled: Sampled, step: float) -> tuple[Modes, Array]:
@@ -214,7 +222,7 @@ def _held_out(system: ModalSystem, records: list[Record], training: list[Record]
     error = size = 0.0
     for record, trained in zip(records, training, strict=True):
         unseen = trained.weights == 0.0
-        error += float(np.sum(_misfit(system, record, scale)[unseen] ** 2))
+        error += float(np.sum(_errors(system, record, scale)[unseen] ** 2))
         size += float(np.sum((record.loads[unseen] / scale) ** 2))
     return float(np.sqrt(error / size)) if size > 0.0 else np.inf
 

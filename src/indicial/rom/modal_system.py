@@ -62,6 +62,11 @@ class ModalSystem:
         loads: Array = states @ self.c.T + inputs.values[:: inputs.stride] @ self.d.T
         return loads
 
+    def residues(self) -> Array:
+        """Of real poles: C_i B_i, shape (n_outputs, order, n_inputs)."""
+        values: Array = self.c[:, :, None] * self.b[None]
+        return values
+
     def balanced(self) -> ModalSystem:
         """The same system with the columns of C of unit size."""
         size = np.linalg.norm(self.c, axis=0)
@@ -132,6 +137,26 @@ def fit_inputs(modes: Modes, c: Array, records: Sequence[Record], scale: Array, 
     b = found[: m * modes.order].reshape(m, modes.order).T
     d = direct if direct is not None else found[m * modes.order :].reshape(p, m)
     return ModalSystem(modes, b, c, d).balanced()
+
+
+def fit_rank_one(modes: Modes, records: Sequence[Record], scale: Array, direct: Array | None) -> ModalSystem:
+    """B and C, and D if it is not given, for real poles.
+
+    With residues of their own for every channel all is linear; of each pole's residues the nearest matrix of rank one,
+    which is what one state can have, gives its column of C.
+    """
+    p = records[0].loads.shape[1]
+    columns = []
+    for output in range(p):
+        alone = [replace(record, loads=record.loads[:, [output]]) for record in records]
+        known = None if direct is None else direct[[output]]
+        columns.append(fit_inputs(modes, np.ones((1, modes.order)), alone, scale[[output]], known).residues())
+    residues = np.concatenate(columns)
+    c = np.zeros((p, modes.order))
+    for i in range(modes.order):
+        left, singular, _ = np.linalg.svd(residues[:, i] / scale[:, None])
+        c[:, i] = scale * left[:, 0] if singular[0] > 0.0 else np.ones(p)
+    return fit_inputs(modes, c, records, scale, direct)
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,9 @@ from indicial.conventions import Array
 from indicial.errors import InputError
 
 
-def observer_markov(inputs: Sequence[Array], outputs: Sequence[Array], memory: int) -> tuple[Array, Array, Array]:
+def observer_markov(
+    inputs: Sequence[Array], outputs: Sequence[Array], memory: int, cutoff: float = 1e-11
+) -> tuple[Array, Array, Array]:
     """Coefficients of the observer from records that all start from rest.
 
     Parameters
@@ -28,6 +30,9 @@ def observer_markov(inputs: Sequence[Array], outputs: Sequence[Array], memory: i
         Uniform samples of each record, shapes (n, n_inputs) and (n, n_outputs).
     memory : int
         q, samples that the observer remembers.
+    cutoff : float
+        Singular values of the regressors below this, relative to the largest, are left out: what smooth motions
+        do not tell.
 
     Returns
     -------
@@ -44,7 +49,7 @@ def observer_markov(inputs: Sequence[Array], outputs: Sequence[Array], memory: i
     if len(rows) < rows.shape[1]:
         raise InputError(f"{len(rows)} samples cannot tell the {rows.shape[1]} coefficients of an observer")
     size = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
-    found = np.linalg.lstsq(rows / size, np.vstack(outputs), rcond=1e-11)[0] / size[:, None]
+    found = np.linalg.lstsq(rows / size, np.vstack(outputs), rcond=cutoff)[0] / size[:, None]
     direct, past = found[:m].T, found[m:].reshape(memory, m + p, p).transpose(0, 2, 1)
     return direct, past[..., :m], past[..., m:]
 
