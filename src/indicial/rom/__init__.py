@@ -2,6 +2,7 @@
 
 from indicial.rom.balancing import Truncation, truncate
 from indicial.rom.check import CheckedCoefficient, PredictionCheck, check_prediction
+from indicial.rom.comparison import Compared, Comparison, compare
 from indicial.rom.convolution import ConvolutionModel
 from indicial.rom.deficiency import DeficiencyIntegral, deficiency, deficiency_integral
 from indicial.rom.identification import identify
@@ -17,6 +18,8 @@ __all__ = [
     "Candidate",
     "ChannelError",
     "CheckedCoefficient",
+    "Compared",
+    "Comparison",
     "ConvolutionModel",
     "DeficiencyIntegral",
     "HeldOut",
@@ -33,6 +36,7 @@ __all__ = [
     "Truncation",
     "advance",
     "check_prediction",
+    "compare",
     "deficiency",
     "deficiency_integral",
     "identify",

@@ -103,6 +103,11 @@ class PredictionCheck:
         """The one figure of merit: largest RMS error relative to the unsteady part, over the coefficients."""
         return max(checked.relative_rms for checked in self.coefficients)
 
+    @property
+    def worst_peak(self) -> float:
+        """Largest error relative to the largest unsteady load, over the coefficients."""
+        return max(checked.relative_peak for checked in self.coefficients)
+
     def summary(self) -> str:
         """What was predicted, and how well, in words."""
         model = self.predicted.provenance.get("rom", "model")
