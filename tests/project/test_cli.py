@@ -74,3 +74,30 @@ def test_mesh_stage_runs_away_from_the_checkout(tmp_path):
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "here" / "mesh" / "half.npz").is_file()
     assert "cells (half)" in done.stderr
+
+
+def test_rom_is_a_stage_or_a_command_on_model_files(tmp_path):
+    import numpy as np
+
+    from indicial.rom import StateSpaceModel
+    from indicial.rom.export import FORMATS
+    from rom.cases import CONDITION, REFERENCE
+
+    one = np.ones((1, 1))
+    model = StateSpaceModel(-one, one, one, one, ("alpha",), ("CN",), np.zeros(6), CONDITION, REFERENCE)
+    model.to_json(tmp_path / "model.json")
+    arguments = ["rom", "export", str(tmp_path / "model.json"), "-o", str(tmp_path / "model.nc"), "--to"]
+    done = CliRunner().invoke(app, [*arguments, "netcdf"])
+    assert (done.exit_code, "model.nc" in done.stdout) == (0, True)
+    assert StateSpaceModel.from_netcdf(tmp_path / "model.nc").to_dict() == model.to_dict()
+    wrong = {
+        ("rom",): "Missing argument 'CASE'",
+        ("rom", "nothing.toml"): "no such case file",
+        ("rom", "export", "nothing.json", "--to", "c", "-o", "x.c"): "nothing.json",
+        (*arguments, "excel"): " is not one of " + ", ".join(f"'{name}'" for name in FORMATS),
+        (*arguments, "fmu"): "must end in .fmu",
+    }
+    for given, message in wrong.items():
+        done = indicial_command(*given, cwd=tmp_path)
+        assert done.returncode == 2, given
+        assert message in done.stderr, given

@@ -58,9 +58,10 @@ def _root(
     pass
 
 
-def _perform(
+def perform(
     target: str, output: str | None, workers: int | None, verbose: bool, stages: tuple[str, ...], resume: bool
 ) -> None:
+    """Run stages of a case or of a run folder, with progress on the terminal."""
     import logging
 
     from indicial.cli.console import ConsoleReporter
@@ -88,7 +89,7 @@ def run(case: Target, output: Output = None, workers: Workers = None, verbose: V
     """
     from indicial.pipeline import ALL_STAGES, open_run
 
-    _perform(case, output, workers, verbose, ALL_STAGES, resume=True)
+    perform(case, output, workers, verbose, ALL_STAGES, resume=True)
     folder = open_run(case, output)[1]
     typer.echo((folder.path / "comparison.txt").read_text(encoding="utf-8"))
     typer.echo(f"report: {folder.path / 'report.html'}")
@@ -97,7 +98,7 @@ def run(case: Target, output: Output = None, workers: Workers = None, verbose: V
 @app.command(epilog="**Example:** `indicial mesh data/cases/basic_finner_quick.toml`")
 def mesh(case: Target, output: Output = None, verbose: Verbose = False) -> None:
     """Make and check the meshes of the half and the whole model."""
-    _perform(case, output, None, verbose, ("mesh",), resume=False)
+    perform(case, output, None, verbose, ("mesh",), resume=False)
 
 
 @app.command(epilog="**Example:** `indicial derive runs/basic_finner_quick --method mrf`")
@@ -114,25 +115,19 @@ def derive(
     CFD results that are already in the run folder are used again.
     """
     stages = tuple(one.value for one in Method if one is not Method.ALL) if method is Method.ALL else (method.value,)
-    _perform(case, output, workers, verbose, ("mesh", *stages), resume=True)
-
-
-@app.command(epilog="**Example:** `indicial rom runs/basic_finner_quick`")
-def rom(case: Target, output: Output = None, verbose: Verbose = False) -> None:
-    """A state-space model from the step responses, checked against the forced oscillations it has not seen."""
-    _perform(case, output, None, verbose, ("rom",), resume=False)
+    perform(case, output, workers, verbose, ("mesh", *stages), resume=True)
 
 
 @app.command(epilog="**Example:** `indicial fly runs/basic_finner_quick`")
 def fly(case: Target, output: Output = None, verbose: Verbose = False) -> None:
     """Fly the model twice, with derivatives and with the reduced-order model in the loop; check the damping."""
-    _perform(case, output, None, verbose, ("fly",), resume=False)
+    perform(case, output, None, verbose, ("fly",), resume=False)
 
 
 @app.command(epilog="**Example:** `indicial identify runs/basic_finner_quick`")
 def identify(case: Target, output: Output = None, verbose: Verbose = False) -> None:
     """Measure the flight as a spark range does, with noise, and identify its derivatives."""
-    _perform(case, output, None, verbose, ("identify",), resume=False)
+    perform(case, output, None, verbose, ("identify",), resume=False)
 
 
 @app.command(epilog="**Example:** `indicial compare runs/basic_finner_quick`")
@@ -140,11 +135,11 @@ def compare(case: Target, output: Output = None, verbose: Verbose = False) -> No
     """Set every derivative by every method beside the measured ones: results.json and a table."""
     from indicial.pipeline import open_run
 
-    _perform(case, output, None, verbose, ("compare",), resume=False)
+    perform(case, output, None, verbose, ("compare",), resume=False)
     typer.echo((open_run(case, output)[1].path / "comparison.txt").read_text(encoding="utf-8"))
 
 
 @app.command(epilog="**Example:** `indicial report runs/basic_finner_quick`")
 def report(case: Target, output: Output = None, verbose: Verbose = False) -> None:
     """Draw the figures and write the HTML report, one file that needs nothing else."""
-    _perform(case, output, None, verbose, ("report",), resume=False)
+    perform(case, output, None, verbose, ("report",), resume=False)
