@@ -10,6 +10,7 @@ from indicial.conventions import Array
 from indicial.derivatives import DerivativeTable
 from indicial.reference_data import finner_arl, finner_range, read_table
 from indicial.studies.claim import Claim, largest, relative_rms
+from indicial.studies.finner import experiment_claims
 from indicial.studies.finner.axial_force import axial_force
 from indicial.studies.finner.pieces import LEVELS, LOWEST_WITHOUT_WAKE, OUTLYING, PIECES, SUPERSONIC
 from indicial.studies.finner.selection import (
@@ -35,7 +36,8 @@ FORCED_K = 0.025
 
 def claims(results: Results) -> tuple[Claim, ...]:
     """Every asked figure, and what is reported beside them."""
-    return (*_flights(results), *_context(), *_methods(results), *_meshes(results), *_cost(results))
+    asked = (*_flights(results), *_context(), *_methods(results), *_meshes(results), *_cost(results))
+    return (*asked, *experiment_claims.claims(results))
 
 
 def _flights(results: Results) -> list[Claim]:

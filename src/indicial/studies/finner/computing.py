@@ -14,6 +14,7 @@ from indicial.derivatives import Derivative, DerivativeTable
 from indicial.errors import InputError
 from indicial.methods import forced_oscillation, indicial_response, moving_frame, operator
 from indicial.motion import FlightCondition, Rates
+from indicial.studies.finner.across_fins import AcrossFins
 from indicial.studies.finner.by_part import derivatives_by_part
 from indicial.studies.finner.meshes import NAMES, RELAY, finner_solver
 from indicial.studies.finner.pitching_flow import PitchingFlow
@@ -111,6 +112,16 @@ def _parts(solver: FiniteVolumeSolver, condition: FlightCondition, settings: dic
     return Found(DerivativeTable(records), {"parts": parts})
 
 
+def _across_fins(solver: FiniteVolumeSolver, condition: FlightCondition, settings: dict[str, Any]) -> Found:
+    """The flow between the fins, to be drawn."""
+    loads = solver.steady(condition)
+    records = tuple(
+        Derivative.at(condition, solver.reference, f"{name}_0", "operator", loads[name], "steady state")
+        for name in ("CN", "Cm")
+    )
+    return Found(DerivativeTable(records), {}, {"surface.npz": AcrossFins.of(solver, condition).save})
+
+
 def _moving_frame(solver: FiniteVolumeSolver, condition: FlightCondition, settings: dict[str, Any]) -> Found:
     result = moving_frame.run(solver, condition, ("alpha", "q"))
     kept = DerivativeTable(tuple(r for r in result.derivatives() if r.name in LONGITUDINAL))
@@ -163,6 +174,7 @@ def _pitching_flow(solver: FiniteVolumeSolver, condition: FlightCondition, setti
 _METHODS: dict[str, Callable[[FiniteVolumeSolver, FlightCondition, dict[str, Any]], Found]] = {
     "operator": _operator,
     "parts": _parts,
+    "across_fins": _across_fins,
     "mrf": _moving_frame,
     "fom": _forced_oscillation,
     "irm": _indicial_response,
@@ -172,5 +184,5 @@ _METHODS: dict[str, Callable[[FiniteVolumeSolver, FlightCondition, dict[str, Any
     "time_step": _forced_oscillation,
 }
 
-_DRAWN = ("field", "loop", "steps")
+_DRAWN = ("across_fins", "field", "loop", "steps")
 """Methods whose files are kept."""

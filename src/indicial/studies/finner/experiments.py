@@ -12,17 +12,23 @@ from indicial.studies.piece import Piece
 NEAR_ONE = tuple(round(1.06 + 0.02 * n, 2) for n in range(14))
 """Mach numbers about the jump of Cm_alphadot."""
 
-FINS_CHANGED = (
-    "no_fins", "plate_fins", "thickness_0.02", "thickness_0.04", "thickness_0.12", "double_wedge_fins", "half_span",
-)  # fmt: skip
-"""Variants computed about the jump."""
+DRAWN_ACROSS = (1.1, 1.16, 1.24)
+"""Mach numbers of the pictures of the flow across the fins."""
 
-OF_UNKNOWN_SIZE = ("no_fins", "thickness_0.04", "thickness_0.088", "thickness_0.12", "span_0.95", "chord_0.95")
+FINS_CHANGED = {
+    "no_fins": NEAR_ONE[::4],
+    "plate_fins": NEAR_ONE[::2],
+    "thickness_0.02": NEAR_ONE[:8],
+    "thickness_0.04": NEAR_ONE[:10],
+    "thickness_0.12": NEAR_ONE[3:],
+    "half_span": NEAR_ONE[::2],
+}
+"""Variants computed about the jump, and their Mach numbers."""
+
+OF_UNKNOWN_SIZE = ("thickness_0.04", "thickness_0.088", "chord_0.95")
 """Variants computed at the outlying groups of flights."""
 
-INCIDENCES = dict.fromkeys((1.057, 1.077, 1.16, 1.254, 1.332), (0.5, 1.0, 2.0)) | dict.fromkeys(
-    OUTLYING, (1.0, 2.0, 3.0, 4.0, 5.0)
-)
+INCIDENCES = dict.fromkeys((1.077, 1.16, 1.254), (1.0, 2.0)) | dict.fromkeys(OUTLYING, (3.0, 5.0))
 """Angles of attack [deg] about which the flow is linearised, by Mach number; free flights yaw by 1 to 6 degrees."""
 
 SLOW = (0.0024, 0.004)
@@ -42,9 +48,10 @@ def _experiment(method: str, kind: str, level: str, mach: float, **settings: Any
 def _near_one() -> list[Piece]:
     """Where the jump sits on the body, and what of the fins it depends on."""
     listed = [_experiment("parts", "sting", "quick", mach) for mach in NEAR_ONE]
-    listed += [_experiment("parts", "sting", "coarse", mach) for mach in (1.1, 1.14, 1.16, 1.18, 1.24, 1.3)]
-    for variant in FINS_CHANGED:
-        listed += [_experiment("operator", f"sting+{variant}", "quick", mach, k=[]) for mach in NEAR_ONE]
+    listed += [_experiment("parts", "sting", "coarse", mach) for mach in (1.1, 1.14, 1.16, 1.2)]
+    listed += [_experiment("across_fins", "sting", "coarse", mach) for mach in DRAWN_ACROSS]
+    for variant, machs in FINS_CHANGED.items():
+        listed += [_experiment("operator", f"sting+{variant}", "quick", mach, k=[]) for mach in machs]
     return listed
 
 
@@ -64,7 +71,7 @@ def _outlying() -> list[Piece]:
     listed = []
     for mach in OUTLYING:
         listed += [_experiment("operator", f"base+{name}", "coarse", mach, k=[]) for name in OF_UNKNOWN_SIZE]
-        listed += [_experiment("operator", "sting", level, mach, k=[]) for level in ("quick", "coarse")]
+        listed.append(_experiment("operator_without_k", "sting", "coarse", mach, k=[]))
         listed.append(_experiment("operator_slow", "base", "coarse", mach, k=list(SLOW)))
     return listed
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from indicial.reference_data import finner_arl, finner_range, read_table
 from indicial.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, figure_style, save, symbol
+from indicial.studies.finner import experiment_figures
 from indicial.studies.finner.agreement import SUM
 from indicial.studies.finner.axial_force import axial_force
 from indicial.studies.finner.flow_pictures import shock_pattern, surface_pressure
@@ -246,6 +247,7 @@ _FIGURES: dict[str, Callable[[Results, _Canvas], Figure]] = {
     "axial_force": _axial,
     "refinement": _refinement,
     "transonic": _transonic,
+    **experiment_figures.FIGURES,
 }
 
 _PICTURES: dict[str, Callable[[Results, Any], Figure | None]] = {

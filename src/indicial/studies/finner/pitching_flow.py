@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from indicial.cfd.field import FlowField
+from indicial.cfd.mesh import Mesh
 from indicial.conventions import Array, mesh_from_body
 from indicial.errors import InputError
 from indicial.files import atomic_path
@@ -40,6 +42,28 @@ class Patch:
     points: Array
     quads: Indices
     values: dict[str, Array]
+
+    @classmethod
+    def of(cls, mesh: Mesh, faces: NDArray[Any], diameter: float, values: dict[str, Array]) -> Self:
+        """Faces of a mesh with their own numbering of points; a triangle repeats its last corner."""
+        nodes = []
+        for face in faces:
+            corners = np.asarray(mesh.face_nodes(int(face)))
+            nodes.append(np.concatenate([corners, corners[-1:].repeat(4 - len(corners))]))
+        used, quads = np.unique(np.array(nodes), return_inverse=True)
+        return cls(mesh.points[used] / diameter, quads.reshape(-1, 4).astype(np.int32), values)
+
+    def to_arrays(self, name: str) -> dict[str, Any]:
+        """In single precision, under names that begin with `name`."""
+        arrays: dict[str, Any] = {f"{name}_points": self.points.astype(np.float32)}
+        arrays[f"{name}_quads"] = self.quads.astype(np.uint16 if len(self.points) < 2**16 else np.int32)
+        return arrays | {f"{name}_{key}": values.astype(np.float32) for key, values in self.values.items()}
+
+    @classmethod
+    def from_arrays(cls, stored: Any, name: str, keys: Sequence[str]) -> Self:
+        """Inverse of `to_arrays`, of those values that `keys` name."""
+        values = {key: stored[f"{name}_{key}"].astype(float) for key in keys}
+        return cls(stored[f"{name}_points"].astype(float), stored[f"{name}_quads"].astype(np.int32), values)
 
     @property
     def corners(self) -> Array:
@@ -91,8 +115,8 @@ class PitchingFlow:
         relative = field.velocity[cells] - mesh_from_body(condition.velocity) / condition.speed_of_sound
         speed = np.linalg.norm(relative, axis=1) / np.sqrt(field.pressure[cells] / field.density[cells])
         return cls(
-            _patch(mesh, field.wall_faces, diameter, {"cp": field.wall_cp}),
-            _patch(mesh, plane, diameter, {"cp": field.cp[cells], "mach": speed}),
+            Patch.of(mesh, field.wall_faces, diameter, {"cp": field.wall_cp}),
+            Patch.of(mesh, plane, diameter, {"cp": field.cp[cells], "mach": speed}),
             condition.mach,
             condition.alpha,
             q,
@@ -102,9 +126,7 @@ class PitchingFlow:
         """Write a compressed numpy archive in one step, in single precision."""
         arrays: dict[str, Any] = {"schema_version": SCHEMA_VERSION, "flight": np.array([self.mach, self.alpha, self.q])}
         for name, patch in (("wall", self.wall), ("plane", self.plane)):
-            arrays[f"{name}_points"] = patch.points.astype(np.float32)
-            arrays[f"{name}_quads"] = patch.quads.astype(np.uint16 if len(patch.points) < 2**16 else np.int32)
-            arrays |= {f"{name}_{key}": values.astype(np.float32) for key, values in patch.values.items()}
+            arrays |= patch.to_arrays(name)
         with atomic_path(path) as temporary, temporary.open("wb") as stream:
             np.savez_compressed(stream, **arrays)
 
@@ -121,25 +143,9 @@ class PitchingFlow:
             with np.load(path, allow_pickle=False) as stored:
                 if int(stored["schema_version"]) != SCHEMA_VERSION:
                     raise ValueError(f"schema_version must be {SCHEMA_VERSION}")
-                wall, plane = (
-                    Patch(
-                        stored[f"{name}_points"].astype(float),
-                        stored[f"{name}_quads"].astype(np.int32),
-                        {key: stored[f"{name}_{key}"].astype(float) for key in keys},
-                    )
-                    for name, keys in (("wall", ("cp",)), ("plane", ("cp", "mach")))
-                )
+                wall = Patch.from_arrays(stored, "wall", ("cp",))
+                plane = Patch.from_arrays(stored, "plane", ("cp", "mach"))
                 mach, alpha, q = stored["flight"].tolist()
                 return cls(wall, plane, mach, alpha, q)
         except (OSError, EOFError, ValueError, KeyError, BadZipFile) as error:
             raise InputError(f"{path}: not a flow in steady pitch ({error})") from error
-
-
-def _patch(mesh: Any, faces: NDArray[Any], diameter: float, values: dict[str, Array]) -> Patch:
-    """Faces of a mesh with their own numbering of points; a triangle repeats its last corner."""
-    nodes = []
-    for face in faces:
-        corners = np.asarray(mesh.face_nodes(int(face)))
-        nodes.append(np.concatenate([corners, corners[-1:].repeat(4 - len(corners))]))
-    used, quads = np.unique(np.array(nodes), return_inverse=True)
-    return Patch(mesh.points[used] / diameter, quads.reshape(-1, 4).astype(np.int32), values)
