@@ -12,7 +12,7 @@ from typing import Any
 from indicial.cfd import FiniteVolumeSolver
 from indicial.derivatives import Derivative, DerivativeTable
 from indicial.errors import InputError
-from indicial.methods import forced_oscillation, indicial_response, moving_frame, operator
+from indicial.methods import forced_oscillation, indicial_response, moving_frame, operator, reduced_frequency
 from indicial.motion import FlightCondition, Rates
 from indicial.studies.finner.across_fins import AcrossFins
 from indicial.studies.finner.by_part import derivatives_by_part
@@ -144,6 +144,13 @@ def _forced_oscillation(solver: FiniteVolumeSolver, condition: FlightCondition, 
     return Found(reading.derivatives(), work, {"loop.nc": history.to_netcdf})
 
 
+def _periodic(solver: FiniteVolumeSolver, condition: FlightCondition, settings: dict[str, Any]) -> Found:
+    """A pitch oscillation of finite amplitude as a truncated Fourier series."""
+    amplitude = math.radians(settings["amplitude_deg"])
+    loads = reduced_frequency.run(solver, condition, amplitude, settings["k"], harmonics=settings["harmonics"])
+    return Found(loads.derivatives(), {"periodic": loads.provenance, "distortion": loads.distortion("Cm")})
+
+
 def _indicial_response(solver: FiniteVolumeSolver, condition: FlightCondition, settings: dict[str, Any]) -> Found:
     s = indicial_response.step_times(settings["first"], settings["growth"], settings["largest"], settings["end"])
     sizes: dict[indicial_response.StepKind, float] = {"alpha": math.radians(settings["alpha_deg"]), "q": settings["q"]}
@@ -177,6 +184,7 @@ _METHODS: dict[str, Callable[[FiniteVolumeSolver, FlightCondition, dict[str, Any
     "across_fins": _across_fins,
     "mrf": _moving_frame,
     "fom": _forced_oscillation,
+    "periodic": _periodic,
     "irm": _indicial_response,
     "field": _pitching_flow,
     "loop": _forced_oscillation,

@@ -31,6 +31,9 @@ OF_UNKNOWN_SIZE = ("thickness_0.04", "thickness_0.088", "chord_0.95")
 INCIDENCES = dict.fromkeys((1.077, 1.16, 1.254), (1.0, 2.0)) | dict.fromkeys(OUTLYING, (3.0, 5.0))
 """Angles of attack [deg] about which the flow is linearised, by Mach number; free flights yaw by 1 to 6 degrees."""
 
+AMPLITUDES = {1.077: (2.0,), 1.16: (0.5, 1.0, 2.0), 1.254: (2.0,), 2.718: (2.0,), 4.3: (2.0, 4.5, 6.0)}
+"""Amplitudes of pitch oscillations [deg]: up to what the flights' mean squared yaw is of a plane motion."""
+
 SLOW = (0.0024, 0.004)
 """Reduced frequencies of the flights themselves."""
 
@@ -66,6 +69,17 @@ def _about_incidence() -> list[Piece]:
     return listed
 
 
+def _of_finite_amplitude() -> list[Piece]:
+    """Oscillations as slow as the flights' and as large."""
+    listed = []
+    for mach, amplitudes in AMPLITUDES.items():
+        kind, level = ("base", "coarse") if mach in OUTLYING else ("sting", "quick")
+        for amplitude in amplitudes:
+            settings = {"amplitude_deg": amplitude, "k": SLOW[1], "harmonics": 2}
+            listed.append(_experiment(f"periodic_{amplitude:g}deg", kind, level, mach, **settings))
+    return listed
+
+
 def _outlying() -> list[Piece]:
     """What may differ between the flights and the flow that is computed."""
     listed = []
@@ -76,5 +90,5 @@ def _outlying() -> list[Piece]:
     return listed
 
 
-EXPERIMENTS: tuple[Piece, ...] = (*_near_one(), *_about_incidence(), *_outlying())
+EXPERIMENTS: tuple[Piece, ...] = (*_near_one(), *_about_incidence(), *_of_finite_amplitude(), *_outlying())
 """All of them."""
