@@ -76,11 +76,11 @@ def across_fins(results: Results, canvas: _Canvas) -> Figure:
     """Mach number and lagging pressure on a cylinder half way along the span, rolled out about one fin."""
     found = results.select(method="across_fins")
     flows = [AcrossFins.load(one.file("surface")) for mach in found.machs() if (one := found.at(float(mach)))]
-    figure, axes = canvas(2, max(1, len(flows)), figsize=(10.2, 5.6), sharex=True, sharey=True, squeeze=False)
+    figure, axes = canvas(2, max(1, len(flows)), figsize=(10.2, 4.3), sharex=True, sharey=True, squeeze=False)
     for column, flow in enumerate(flows):
         surface = flow.surface
         x, arc = surface.points[:, 0], _arc(surface.points)
-        late = 25.0
+        late = 40.0
         shown = (("mach", 0.85, 1.35, "RdBu_r", "Mach number"), ("lag", -late, late, "PuOr_r", "lagging pressure"))
         for row, (name, low, high, colours, label) in enumerate(shown):
             ax = axes[row, column]
