@@ -13,6 +13,7 @@ from indicial.cfd.flow.residual import MeshMotion, Residual
 from indicial.cfd.march import BlockILU, Pattern, TwoLevel, converge, gmres
 from indicial.cfd.march.aggregation import CoarseLevel, aggregates
 from indicial.cfd.march.assembly import wide_blocks
+from indicial.cfd.march.preconditioner import SECOND_ORDER_PARTS
 from indicial.cfd.mesh import Mesh, airfoil_mesh, box_mesh, cone_mesh
 from indicial.cfd.shapes import Airfoil, Cone
 from indicial.conventions import Array, ReferenceQuantities
@@ -179,3 +180,29 @@ def test_a_cone_at_supersonic_speed_takes_less_than_half_the_products_too() -> N
     mass = 0.2j * jacobian.grid.volume[:, None, None] * conservative_jacobian(state)
     before, after = products(jacobian, b, mass)
     assert after < before / 2
+
+
+def along(length: float) -> tuple[Jacobian, Array]:
+    """J of a uniform stream at M 1.2 along cells so many times as long as they are wide, and a right-hand side."""
+    kinds = {"x_max": "outflow", "y_min": "wall", "z_min": "wall"}
+    grid = Grid.from_mesh(box_mesh((6, 12, 12), upper=(6.0 * length, 12.0, 12.0), kinds=kinds), REFERENCE)
+    still = np.tile(STILL_AIR, (grid.n_cells, 1))
+    return Jacobian(Residual(grid), still, MeshMotion(np.array([-1.2, 0.0, 0.0]), np.zeros(3))), random(still.shape)
+
+
+def test_cells_a_hundred_times_longer_than_wide_do_not_upset_the_factors(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a wake far behind a sting: there the factors bear less of the second-order terms."""
+    jacobian, b = along(100.0)
+    pattern = Pattern.wide(jacobian.grid)
+    found = TwoLevel(jacobian, pattern)
+    assert found.part < SECOND_ORDER_PARTS[0]
+    solution = gmres(jacobian.apply, found.solve, b, 1e-8, restart=160, restarts=1)
+    assert solution.relative_residual <= 1e-8
+    monkeypatch.setattr("indicial.cfd.march.preconditioner.SECOND_ORDER_PARTS", SECOND_ORDER_PARTS[:1])
+    upset = gmres(jacobian.apply, TwoLevel(jacobian, pattern).solve, b, 1e-8, restart=2 * solution.products, restarts=1)
+    assert upset.relative_residual > 1e-2
+
+
+def test_where_the_factors_bear_them_most_second_order_terms_are_kept() -> None:
+    jacobian, _ = along(1.0)
+    assert TwoLevel(jacobian, Pattern.wide(jacobian.grid)).part == SECOND_ORDER_PARTS[0]
