@@ -8,13 +8,20 @@ import pytest
 from indicial.cfd.field import FlowField
 from indicial.cfd.mesh import finned_body_mesh
 from indicial.errors import InputError
+from indicial.history import History
+from indicial.methods import forced_oscillation, indicial_response
 from indicial.motion import FlightCondition
 from indicial.report.solid import View, normals, whole
 from indicial.report.style import figure_style
+from indicial.studies import find_study
 from indicial.studies.finner.figures import _PICTURES
 from indicial.studies.finner.pitching_flow import WINDOW, Patch, PitchingFlow
+from indicial.studies.finner.selection import derivative
 from indicial.studies.finner.variants import FINNER
 from indicial.studies.kept import Results
+
+STUDY = find_study("finner")
+KEPT = Results.kept("finner", STUDY.pieces)
 
 CUBE = np.array(
     [
@@ -99,6 +106,66 @@ def test_of_a_cube_three_faces_are_seen_from_ahead_and_the_left(elevation, seen)
     assert {i for i, cosine in enumerate(towards) if cosine > 0.0} == seen
     assert view.axes[1, 2] > 0.0  # up is up
     assert view.axes[0, 0] > 0.0  # aft is to the right
+
+
+def test_kept_loops_give_the_kept_derivatives_again():
+    loops = [r for r in KEPT if r.piece.method.startswith("loop")]
+    assert len(loops) == 6
+    for result in loops:
+        again = forced_oscillation.fourier(History.from_netcdf(result.file("loop"))).derivatives()
+        for record in again:
+            assert record.value == pytest.approx(derivative(result, record.name), rel=1e-9)
+
+
+def test_kept_step_responses_give_the_kept_derivatives_again():
+    steps = KEPT.select(method="steps")
+    assert len(steps) == 3
+    for result in steps:
+        found = {}
+        for kind in ("alpha", "q"):
+            final = {name: derivative(result, f"{name}_{kind}") for name in ("CN", "Cm")}
+            found[kind] = indicial_response.read(History.from_netcdf(result.file(kind)), final)
+        again = indicial_response.derive(found["alpha"], found["q"])
+        for name in ("CN_alphadot", "Cm_alphadot"):
+            assert again[name] == pytest.approx(derivative(result, name), rel=1e-6)
+
+
+def test_kept_flows_are_those_of_their_pieces():
+    flows = KEPT.select(method="field")
+    assert len(flows) == 3
+    for result in flows:
+        flow = PitchingFlow.load(result.file("flow"))
+        assert (flow.mach, flow.q) == (result.piece.mach, result.piece.settings["q"])
+        # a shock can slow the stream and an expansion hasten it, but both stay about the flight's Mach number
+        assert flow.plane.values["mach"].min() < flow.mach < flow.plane.values["mach"].max()
+
+
+def test_kept_loops_are_ellipses():
+    """At the small amplitude of the pictures the last period lies on its first harmonic."""
+    for result in (r for r in KEPT if r.piece.method.startswith("loop")):
+        history = History.from_netcdf(result.file("loop"))
+        omega = float(history.motion["omega"])
+        last = history.time >= history.time[-1] - 2.0 * math.pi / omega * (1.0 + 1e-9)
+        for name in ("CN", "Cm"):
+            loads, phase = history[name][last], omega * history.time[last]
+            waves = np.stack([np.ones_like(phase), np.sin(phase), np.cos(phase)], axis=1)
+            left = loads - waves @ np.linalg.lstsq(waves, loads, rcond=None)[0]
+            assert np.max(np.abs(left)) < 0.002 * 0.5 * np.ptp(loads)
+
+
+def test_smaller_time_steps_change_forced_oscillations_less_than_half_a_percent():
+    claims = [one for one in STUDY.claims(KEPT) if "U dt/d" in one.name]
+    assert len(claims) == 2
+    assert all(one.holds for one in claims)
+
+
+def test_the_longer_the_march_at_mach_1_the_nearer_the_operator():
+    exact = derivative(KEPT.select(method="operator_without_steps").results[0], "Cm_q", k=0.025)
+    short, longer = (
+        derivative(KEPT.select(method=name).results[0], "Cm_q") for name in ("time_step_0.05", "fom_pitch_rate_longer")
+    )
+    assert abs(longer - exact) < abs(short - exact)
+    assert longer == pytest.approx(exact, rel=0.005)
 
 
 def test_nothing_is_drawn_of_nothing():

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 LIGHT = (-0.25, 0.35, 0.9)
-"""Direction towards the light: from the viewer to the picture's right, up, and towards the viewer."""
+"""Direction towards the light, by the picture's axes: right, up, to the viewer."""
 
-AMBIENT = 0.55
+AMBIENT = 0.7
 """Brightness of a face that the light does not reach."""
 
 

@@ -69,6 +69,8 @@ class Claim:
             return "-"
         if self.unit != "%":
             return f"{value:.{digits}f} {self.unit}"
+        if digits == 0:
+            return f"{100.0 * value:.3g}%"
         return f"{value:.{digits}%}" if value >= 1e-3 or value == 0.0 else f"{100.0 * value:.1g}%"
 
 

@@ -12,7 +12,15 @@ from indicial.reference_data import finner_arl, finner_range, read_table
 from indicial.studies.claim import Claim, largest, relative_rms
 from indicial.studies.finner import experiment_claims
 from indicial.studies.finner.axial_force import axial_force
-from indicial.studies.finner.pieces import LEVELS, LOWEST_WITHOUT_WAKE, OUTLYING, PIECES, SUPERSONIC
+from indicial.studies.finner.pieces import (
+    LEVELS,
+    LOWEST_WITHOUT_WAKE,
+    OUTLYING,
+    PIECES,
+    SONIC,
+    STEPS_PER_PERIOD,
+    SUPERSONIC,
+)
 from indicial.studies.finner.selection import (
     OTHER_MOMENT_REFERENCE,
     about,
@@ -36,8 +44,8 @@ FORCED_K = 0.025
 
 def claims(results: Results) -> tuple[Claim, ...]:
     """Every asked figure, and what is reported beside them."""
-    asked = (*_flights(results), *_context(), *_methods(results), *_meshes(results), *_cost(results))
-    return (*asked, *experiment_claims.claims(results))
+    asked = (*_flights(results), *_context(), *_methods(results), *_time_steps(results))
+    return (*asked, *_meshes(results), *_cost(results), *experiment_claims.claims(results))
 
 
 def _flights(results: Results) -> list[Claim]:
@@ -147,6 +155,19 @@ def _transfer(results: Results) -> Claim:
         worst = int(np.argmax(np.abs(deviation)))
         return Claim(title, abs(deviation[worst]), 1e-4, f"worst {list(moved)[worst]} at M {one.piece.mach:g}")
     return Claim(title, None, 1e-4)
+
+
+def _time_steps(results: Results) -> list[Claim]:
+    """What smaller time steps change of forced oscillations at M 1, from the largest to the smallest of the paper."""
+    large, small = max(STEPS_PER_PERIOD), min(STEPS_PER_PERIOD)
+    pair = [results.select(method=f"time_step_{step:g}").at(SONIC) for step in (large, small)]
+    listed = []
+    for name in ("Cm_q", "CN_q"):
+        values = [derivative(one, name) for one in pair if one is not None]
+        found = [values[0] / values[1] - 1.0] if len(values) == 2 else []
+        title = f"{name}: FOM with U dt/d = {large:g} against {small:g}"
+        listed.append(largest(title, 0.005, [SONIC] * len(found), np.array(found)))
+    return listed
 
 
 def _meshes(results: Results) -> list[Claim]:

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 ABOVE, BELOW = View(math.radians(-28.0), math.radians(24.0)), View(math.radians(-28.0), math.radians(-24.0))
 
+LENGTH, HEIGHT = (-1.0, 12.0), 9.0
+"""Part of the symmetry plane that is shown: x from and to, and at most that high [calibres]."""
+
 
 def surface_pressure(results: Results, plt: Any) -> Figure | None:
     """Pressure on the body in a steady pitch rate, seen from above and from below."""
@@ -26,17 +29,17 @@ def surface_pressure(results: Results, plt: Any) -> Figure | None:
     if not flows:
         return None
     figure: Figure
-    figure, panels = plt.subplots(len(flows), 2, figsize=(13.0, 3.1 * len(flows) + 0.6), squeeze=False)
-    limit = max(float(np.quantile(np.abs(flow.wall.values["cp"]), 0.98)) for flow in flows)
-    scale = plt.cm.ScalarMappable(plt.Normalize(-limit, limit), "RdBu_r")
+    figure, panels = plt.subplots(len(flows), 2, figsize=(13.0, 2.5 * len(flows) + 0.8), squeeze=False)
     for row, flow in zip(panels, flows, strict=True):
-        colours = scale.to_rgba(np.tile(flow.wall.values["cp"], 2))
+        pressure = flow.wall.values["cp"]
+        limit = float(np.quantile(np.abs(pressure), 0.98))
+        scale = plt.cm.ScalarMappable(plt.Normalize(-limit, limit), "RdBu_r")
         for axes, view in zip(row, (ABOVE, BELOW), strict=True):
-            draw_solid(axes, whole(flow.wall.corners), colours, view)
-        row[0].text(0.02, 0.8, f"M {flow.mach:g}", transform=row[0].transAxes, fontsize=15)
+            draw_solid(axes, whole(flow.wall.corners), scale.to_rgba(np.tile(pressure, 2)), view)
+        row[0].text(0.02, 0.75, f"M {flow.mach:g}", transform=row[0].transAxes, fontsize=15)
+        figure.colorbar(scale, ax=row, label="pressure coefficient", shrink=0.9, aspect=14, pad=0.01)
     panels[0, 0].set_title("seen from above")
     panels[0, 1].set_title("seen from below")
-    figure.colorbar(scale, ax=panels, label="pressure coefficient", shrink=0.5, aspect=30, pad=0.01)
     figure.suptitle(
         f"{_flight(flows[0])}: nose up, tail down.\n"
         "The nose meets the air from above, the fins from below: both resist the rotation."
@@ -50,7 +53,10 @@ def shock_pattern(results: Results, plt: Any) -> Figure | None:
     if not flows:
         return None
     figure: Figure
-    figure, panels = plt.subplots(len(flows), 1, figsize=(9.5, 5.2 * len(flows)), squeeze=False)
+    heights = [min(float(np.ptp(flow.plane.points[:, 2])), HEIGHT) for flow in flows]
+    figure, panels = plt.subplots(
+        len(flows), 1, figsize=(10.0, 0.62 * sum(heights) + 1.1 * len(flows)), squeeze=False, height_ratios=heights
+    )
     for axes, flow in zip(panels[:, 0], flows, strict=True):
         _symmetry_plane(axes, flow)
     figure.suptitle(f"{_flight(flows[0])}: symmetry plane")
@@ -64,10 +70,11 @@ def _symmetry_plane(axes: Axes, flow: PitchingFlow) -> None:
     plane = flow.plane
     x, z, mach = plane.points[:, 0], plane.points[:, 2], plane.at_points("mach")
     triangles = Triangulation(x, z, plane.triangles())
-    spread = float(np.quantile(np.abs(mach - flow.mach), 0.995))
+    spread = float(np.quantile(np.abs(mach - flow.mach), 0.98))
     levels = flow.mach + np.linspace(-spread, spread, 61)
+    ticks = [tick for tick in MaxNLocator(7).tick_values(levels[0], levels[-1]) if levels[0] < tick < levels[-1]]
     filled = axes.tricontourf(triangles, mach, levels, cmap="RdYlBu_r", extend="both")
-    axes.figure.colorbar(filled, ax=axes, label="Mach number", shrink=0.85, ticks=MaxNLocator(8), pad=0.02)
+    axes.figure.colorbar(filled, ax=axes, label="Mach number", shrink=0.75, aspect=18, ticks=ticks, pad=0.02)
     pressure = plane.at_points("cp")
     bound = float(np.quantile(np.abs(pressure), 0.98))
     isobars = [level for level in np.linspace(-bound, bound, 25) if abs(level) > 0.02 * bound]
@@ -80,11 +87,14 @@ def _symmetry_plane(axes: Axes, flow: PitchingFlow) -> None:
     )
     shoulder, base = FINNER.nose.length, FINNER.length
     axes.fill([0.0, shoulder, base, base, shoulder], [0.0, 0.5, 0.5, -0.5, -0.5], color="0.3")
+    if x.max() > base:
+        axes.fill([base, LENGTH[1], LENGTH[1], base], [0.5, 0.5, -0.5, -0.5], color="0.6", label="sting")
     for side in (-1.0, 1.0):
         _fin(axes, side)
     axes.plot([], [], color="0.3", lw=1.0, ls="--", label="fins, at 45° to the plane")
     axes.set(xlabel="x/d, aft of the nose", ylabel="z/d", aspect="equal")
-    axes.set(xlim=(max(x.min(), -1.5), x.max()), ylim=(z.min(), z.max()))
+    half = 0.5 * min(float(np.ptp(z)), HEIGHT)
+    axes.set(xlim=LENGTH, ylim=(-half, half))
     axes.grid(visible=False)
     axes.set_title(f"M {flow.mach:g}")
     axes.legend(loc="upper left", fontsize=8)

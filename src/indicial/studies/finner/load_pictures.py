@@ -12,7 +12,7 @@ from indicial.history import History
 from indicial.methods import forced_oscillation, indicial_response
 from indicial.reference_data import read_table
 from indicial.report.style import BLACK, BLUE, GREY, ORANGE, SKY, VERMILION, symbol
-from indicial.studies.finner.pieces import REDUCED_FREQUENCIES, STEPS_PER_PERIOD
+from indicial.studies.finner.pieces import FORCED, REDUCED_FREQUENCIES, STEPS_PER_PERIOD
 from indicial.studies.finner.selection import derivative
 from indicial.studies.kept import Results
 from indicial.studies.piece import PieceResult
@@ -51,7 +51,8 @@ def hysteresis(results: Results, plt: Any) -> Figure | None:
         row[0].set_ylabel(symbol(name))
     panels[0, 0].legend(fontsize=8)
     figure.suptitle(
-        "Forced oscillation in pitch: last period (dots), its first harmonic (lines), the way round (arrows)"
+        "Forced oscillation in pitch: last period (dots), its first harmonic (lines), the way round (arrows).\n"
+        "The moment's loops run counter-clockwise: the air takes energy out of the motion."
     )
     return figure
 
@@ -133,22 +134,31 @@ def time_step(results: Results, plt: Any) -> Figure | None:
     figure, panels = plt.subplots(2, 2, figsize=(10.0, 6.6), sharex=True)
     for column, (name, found) in zip(panels.T, values.items(), strict=True):
         best = found[steps.index(FINEST_STEP)]
-        column[0].plot(steps, found, "o-", color=BLUE, label="FOM, k = 0.025")
-        for limit in results.select(method="operator_without_steps"):
-            exact = derivative(limit, name, k=0.025)
-            column[0].axhline(exact, color=GREY, ls="--", label="operator at k: no time step")
+        column[0].plot(steps, found, "o-", color=BLUE, label="FOM, second period")
+        for method, wanted, style, label in _WITHOUT_START:
+            for limit in results.select(method=method):
+                column[0].axhline(derivative(limit, name, **wanted), color=GREY, ls=style, label=label)
         column[0].set_ylabel(f"{symbol(name)} [1/rad]")
-        column[0].margins(y=1.0)
+        column[0].set_ylim(sorted((0.97 * best, 1.03 * best)))
         column[1].plot(
             paper.numbers("time_step"), paper.numbers(name), "s-", color=VERMILION, label="the paper, Table 1"
         )
-        column[1].plot(steps, 100.0 * (found / best - 1.0), "o-", color=BLUE, label="this code")
-        column[1].set_ylabel(f"change of {symbol(name)} from 0.05 [%]")
+        change = 100.0 * (found / best - 1.0)
+        column[1].plot(
+            steps, change, "o-", color=BLUE, label=f"this code, at most {np.max(np.abs(change)):.1g}% either way"
+        )
+        column[1].set_ylabel(f"change of {symbol(name)} from U Δt/d = 0.05 [%]")
         column[1].set_xlabel("time step U Δt/d")
         for axes in column:
             axes.legend(fontsize=8)
-    figure.suptitle("Forced pitch rate at M 1: convergence with the time step")
+    figure.suptitle("Forced pitch rate at M 1, k = 0.025: convergence with the time step")
     return figure
+
+
+_WITHOUT_START: tuple[tuple[str, dict[str, object], str, str], ...] = (
+    ("fom_pitch_rate_longer", {}, ":", "FOM, second to sixth period, U Δt/d = 1.05"),
+    ("operator_without_steps", {"k": FORCED["k"]}, "--", "operator at k: no start, no time step"),
+)
 
 
 def _time_steps(results: Results) -> tuple[list[float], dict[str, Array]]:

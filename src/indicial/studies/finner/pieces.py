@@ -145,7 +145,7 @@ def _shown() -> list[Piece]:
 
 
 def _time_steps(level: str) -> list[Piece]:
-    """One oscillation by ever smaller steps, and what the operator says of steps without end."""
+    """One oscillation by ever smaller steps, by more periods, and what the operator says without steps and a start."""
     operator = _piece("operator_without_steps", "sting", level, SONIC, k=[FORCED["k"]])
     marches = [
         _piece(
@@ -153,7 +153,8 @@ def _time_steps(level: str) -> list[Piece]:
         )
         for step, count in STEPS_PER_PERIOD.items()
     ]
-    return [operator, *marches]
+    longer = _piece("fom_pitch_rate_longer", "sting", level, SONIC, **{**FORCED, "periods": 6}, motion="pitch_rate")
+    return [operator, *marches, longer]
 
 
 PIECES: tuple[Piece, ...] = (
