@@ -292,7 +292,7 @@ def test_exports_that_cannot_be_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="letters, digits"):
         export(model, "c", tmp_path / "my-model.c")
     double = replace(any_model(2), a=np.array([[-0.5, 1.0], [0.0, -0.5]]))
-    for to in ("c", "fmu"):
+    for to in ("c", "fmu", "jsbsim"):
         with pytest.raises(InputError, match="no modal form"):
             export(double, to, tmp_path / f"model{SUFFIXES[to]}")
     (tmp_path / "old.json").write_text(json.dumps({"format": "indicial state-space model", "schema_version": 99}))
@@ -303,3 +303,86 @@ def test_exports_that_cannot_be_are_refused(tmp_path: Path) -> None:
 def test_every_format_has_a_suffix() -> None:
     assert set(FORMATS) == set(SUFFIXES)
     assert FlightCondition(2.0).speed > 0.0
+
+
+AIRCRAFT = """<?xml version="1.0"?>
+<fdm_config name="slab" version="2.0" release="ALPHA">
+  <fileheader><author/><filecreationdate/><description/><version/></fileheader>
+  <metrics>
+    <wingarea unit="FT2">7</wingarea><wingspan unit="FT">7</wingspan><chord unit="FT">7</chord>
+    <location name="AERORP" unit="M"><x>0.3</x><y>0</y><z>0</z></location>
+  </metrics>
+  <mass_balance>
+    <ixx unit="KG*M2">2e5</ixx><iyy unit="KG*M2">2e5</iyy><izz unit="KG*M2">2e5</izz>
+    <emptywt unit="KG">4e3</emptywt><location name="CG" unit="M"><x>0.3</x><y>0</y><z>0</z></location>
+  </mass_balance>
+  <ground_reactions/><propulsion/>
+  <system file="wing_memory"/>
+  <aerodynamics file="wing"/>
+</fdm_config>
+"""
+
+
+def jsbsim_aircraft(model: StateSpaceModel, folder: Path) -> Any:
+    """A heavy body with the exported model, ready to fly at M 2, pitching and rolling."""
+    jsbsim = pytest.importorskip("jsbsim")
+    place = folder / "aircraft" / "slab"
+    (place / "Systems").mkdir(parents=True)
+    (place / "slab.xml").write_text(AIRCRAFT)
+    aerodynamics, memory = export(model, "jsbsim", place / "wing.xml")
+    memory.rename(place / "Systems" / memory.name)
+    assert aerodynamics.exists()
+    jsbsim.FGJSBBase().debug_lvl = 0
+    program = jsbsim.FGFDMExec(str(folder))
+    program.set_debug_level(0)
+    program.set_dt(0.002)
+    assert program.load_model("slab")
+    program["ic/h-sl-ft"], program["ic/mach"] = 30000.0, 2.0
+    program["ic/alpha-deg"], program["ic/q-rad_sec"], program["ic/p-rad_sec"] = 2.0, 0.3, 0.4
+    assert program.run_ic()
+    return program
+
+
+def watch(program: Any) -> tuple[Array, float, float, Array]:
+    """Inputs of the model, speed [m/s], dt [s] and the coefficients, of one frame."""
+    motion = [program["aero/alpha-rad"], program["velocities/p-aero-rad_sec"], program["velocities/q-aero-rad_sec"]]
+    speed = program["velocities/vt-fps"] * 0.3048
+    loads = np.array([program[f"indicial/{name}"] for name in COEFFICIENTS])
+    return dimensionless(np.array([motion]), speed)[0], speed, program["simulation/dt"], loads
+
+
+@pytest.mark.parametrize("order", [0, 7])
+def test_jsbsim_predicts_what_the_package_does_while_speed_and_step_change(order: int, tmp_path: Path) -> None:
+    model = any_model(order)
+    program = jsbsim_aircraft(model, tmp_path)
+    u, speed, _, found = watch(program)
+    rows = [COEFFICIENTS.index(name) for name in model.outputs]
+    flow, loads = stream(model, u), np.empty(4)
+    advance(flow, u, 0.0, loads)
+    np.testing.assert_allclose(found[rows], loads, rtol=1e-12)
+    first, start = u, speed
+    for k in range(300):
+        if k == 150:
+            program.set_dt(0.0005)
+        program.run()
+        previous = speed
+        u, speed, dt, found = watch(program)
+        advance(flow, u, 2.0 * previous * dt / 0.5, loads)
+        assert np.all(np.isfinite(found))
+        np.testing.assert_allclose(found[rows], loads, atol=1e-10 * np.max(np.abs(loads)))
+        np.testing.assert_allclose(np.delete(found, rows), model.baseline[[0, 1]], rtol=1e-14)
+    assert np.max(np.abs(u - first)) > 1e-3
+    assert abs(speed / start - 1.0) > 2e-4
+
+
+def test_jsbsim_applies_the_loads_in_its_body_axes(tmp_path: Path) -> None:
+    program = jsbsim_aircraft(any_model(), tmp_path)
+    for _ in range(5):
+        program.run()
+    *_, loads = watch(program)
+    pressure = program["aero/qbar-psf"] / 0.3048**2  # times area in m2: pounds
+    forces = [program[f"forces/fb{axis}-aero-lbs"] for axis in "xyz"]
+    np.testing.assert_allclose(forces, pressure * 0.2 * loads[:3] * [-1.0, 1.0, -1.0], rtol=1e-10)
+    moments = [program[f"moments/{axis}-aero-lbsft"] for axis in "lmn"]
+    lengths = np.array([1.3, 0.5, 1.3]) / 0.3048
+    np.testing.assert_allclose(moments, pressure * 0.2 * loads[3:] * lengths, rtol=1e-10)

@@ -43,6 +43,7 @@ class Format(enum.StrEnum):
     MAT = "mat"
     C = "c"
     FMU = "fmu"
+    JSBSIM = "jsbsim"
 
 
 @rom.command(hidden=True, epilog="**Example:** `indicial rom runs/basic_finner_quick`")
@@ -60,7 +61,7 @@ def export(
         bool, typer.Option("--sources-only", help="Do not compile an FMU: whoever imports it does.")
     ] = False,
 ) -> None:
-    """Write a model for another program: MATLAB, C, an FMU, or the package's own files."""
+    """Write a model for another program: MATLAB, C, an FMU, JSBSim, or the package's own files."""
     from indicial.errors import InputError
     from indicial.rom.export import export as write
     from indicial.rom.export import export_fmu, read_model

@@ -12,6 +12,7 @@ from pathlib import Path
 from indicial.errors import InputError
 from indicial.rom.export.c_source import export_c
 from indicial.rom.export.fmu import export_fmu
+from indicial.rom.export.jsbsim import export_jsbsim
 from indicial.rom.export.matlab import export_matlab
 from indicial.rom.export.own import export_json, export_netcdf, read_model
 from indicial.rom.state_space import StateSpaceModel
@@ -22,10 +23,11 @@ FORMATS: dict[str, Callable[[StateSpaceModel, Path], tuple[Path, ...]]] = {
     "mat": export_matlab,
     "c": export_c,
     "fmu": export_fmu,
+    "jsbsim": export_jsbsim,
 }
 """Format, and what writes it and returns the files written."""
 
-SUFFIXES = {"json": ".json", "netcdf": ".nc", "mat": ".mat", "c": ".c", "fmu": ".fmu"}
+SUFFIXES = {"json": ".json", "netcdf": ".nc", "mat": ".mat", "c": ".c", "fmu": ".fmu", "jsbsim": ".xml"}
 """Format, and how its file must be called."""
 
 
@@ -55,6 +57,7 @@ __all__ = [
     "export",
     "export_c",
     "export_fmu",
+    "export_jsbsim",
     "export_json",
     "export_matlab",
     "export_netcdf",

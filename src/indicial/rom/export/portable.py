@@ -81,12 +81,12 @@ class Portable:
         x, y, z = reference.moment_reference
         roll, pitch, yaw = reference.moment_lengths
         return [
-            f"Unsteady aerodynamic loads at Mach {condition.mach:g}, linear about alpha = {condition.alpha:.17g} rad, "
-            f"beta = {condition.beta:.17g} rad.",
+            f"Unsteady aerodynamic loads at Mach {condition.mach:g}, linear about alpha = {float(condition.alpha)!r} rad, "
+            f"beta = {float(condition.beta)!r} rad.",
             "Body axes: x forward, y right, z down, origin at the moment reference point, which lies",
-            f"({x:.17g}, {y:.17g}, {z:.17g}) m from the nose in mesh axes (x aft, y right, z up).",
-            f"Reference area {reference.area:.17g} m2; lengths of Cl, Cm, Cn: {roll:.17g}, {pitch:.17g}, {yaw:.17g} m; "
-            f"length of reduced time {reference.length:.17g} m.",
+            f"({float(x)!r}, {float(y)!r}, {float(z)!r}) m from the nose in mesh axes (x aft, y right, z up).",
+            f"Reference area {float(reference.area)!r} m2; lengths of Cl, Cm, Cn: {float(roll)!r}, {float(pitch)!r}, {float(yaw)!r} m; "
+            f"length of reduced time {float(reference.length)!r} m.",
             f"{self.model.order} states. Inputs: "
             + "; ".join(f"{name} [{self.unit(name)}], {MEANING[name]}" for name in self.model.inputs)
             + ".",
