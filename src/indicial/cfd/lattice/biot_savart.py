@@ -132,39 +132,55 @@ def sheet_velocity(nodes, strength, tail, far, core2, points, out):  # type: ign
 
 @njit(**KERNEL)
 def strip_velocities(nodes, weights, far, core2, points, out):  # type: ignore[no-untyped-def]
-    """Velocities per unit strength of each strip of a sheet whose rows are weighted.
+    """Velocities per unit strength of each strip of a sheet whose rings are weighted.
 
-    As `sheet_velocity`, with strength ``weights[q, row]`` (n_weights, rows + 1) in one strip at a time; the last weight
-    is the tail's. Points (3, n_points), out (n_weights, 3, n_points, columns) is overwritten.
+    As `sheet_velocity`, with strength ``weights[q, row, j]`` (n_weights, rows + 1, columns) in strip j alone; the last
+    row of weights is the tails'. Points (3, n_points), out (n_weights, 3, columns, n_points) is overwritten.
     """
     rows, columns = nodes.shape[0] - 1, nodes.shape[1] - 1
     sets, n_points = weights.shape[0], points.shape[1]
-    for p in prange(n_points):
-        px, py, pz = points[0, p], points[1, p], points[2, p]
-        out[:, :, p, :] = 0.0
+    for block in prange((n_points + LANES - 1) // LANES):
+        first = block * LANES
+        count = min(LANES, n_points - first)
+        px, py, pz = (
+            points[0, first : first + count],
+            points[1, first : first + count],
+            points[2, first : first + count],
+        )
+        sums = np.zeros((sets, columns, 3, count))
+        u, v, w = np.empty(count), np.empty(count), np.empty(count)
         for j in range(columns + 1):
             for i in range(rows + 1):
                 ax, ay, az = nodes[i, j, 0], nodes[i, j, 1], nodes[i, j, 2]
                 if i < rows:
                     bx, by, bz = nodes[i + 1, j, 0], nodes[i + 1, j, 1], nodes[i + 1, j, 2]
-                    u, v, w = _segment(px, py, pz, ax, ay, az, bx, by, bz, core2)
+                    for m in range(count):
+                        u[m], v[m], w[m] = _segment(px[m], py[m], pz[m], ax, ay, az, bx, by, bz, core2)
                 else:
-                    u, v, w = _ray(px, py, pz, ax, ay, az, far[0], far[1], far[2], core2)
+                    for m in range(count):
+                        u[m], v[m], w[m] = _ray(px[m], py[m], pz[m], ax, ay, az, far[0], far[1], far[2], core2)
                 for q in range(sets):
-                    gamma = weights[q, i]
                     if j > 0:
-                        out[q, 0, p, j - 1] += gamma * u
-                        out[q, 1, p, j - 1] += gamma * v
-                        out[q, 2, p, j - 1] += gamma * w
+                        _add(sums[q, j - 1], weights[q, i, j - 1], u, v, w)
                     if j < columns:
-                        out[q, 0, p, j] -= gamma * u
-                        out[q, 1, p, j] -= gamma * v
-                        out[q, 2, p, j] -= gamma * w
+                        _add(sums[q, j], -weights[q, i, j], u, v, w)
                 if j < columns:
                     bx, by, bz = nodes[i, j + 1, 0], nodes[i, j + 1, 1], nodes[i, j + 1, 2]
-                    u, v, w = _segment(px, py, pz, ax, ay, az, bx, by, bz, core2)
+                    for m in range(count):
+                        u[m], v[m], w[m] = _segment(px[m], py[m], pz[m], ax, ay, az, bx, by, bz, core2)
                     for q in range(sets):
-                        gamma = weights[q, i] - (weights[q, i - 1] if i > 0 else 0.0)
-                        out[q, 0, p, j] += gamma * u
-                        out[q, 1, p, j] += gamma * v
-                        out[q, 2, p, j] += gamma * w
+                        _add(sums[q, j], weights[q, i, j] - (weights[q, i - 1, j] if i > 0 else 0.0), u, v, w)
+        for q in range(sets):
+            for j in range(columns):
+                for c in range(3):
+                    out[q, c, j, first : first + count] = sums[q, j, c]
+
+
+@njit(**_INLINE)
+def _add(total, gamma, u, v, w):  # type: ignore[no-untyped-def]
+    """Add gamma times a velocity in lanes to total (3, lanes)."""
+    if gamma != 0.0:
+        for m in range(len(u)):
+            total[0, m] += gamma * u[m]
+            total[1, m] += gamma * v[m]
+            total[2, m] += gamma * w[m]

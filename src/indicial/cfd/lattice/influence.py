@@ -101,6 +101,13 @@ class Influence:
             raise DivergenceError("the lattice's influence matrix is singular: do two surfaces coincide?")
         return inverse
 
+    def impulse(self, jump: Array) -> Array:
+        """Circulation (P,) that a jump of the panels' velocity (P, 3) [m/s] gives at once: the wake has no part in it.
+
+        It ends at the trailing edge, and the added mass of a plate is exact for any number of panels along the chord.
+        """
+        return np.asarray(self.inverse @ np.sum(jump * self.lattice.normal, axis=1))
+
     def normal(self, velocity: Array) -> Array:
         """Components along the normals of velocities at the collocation points (3, P, ...), shape (P, ...)."""
         return np.asarray(np.einsum("cp...,pc->p...", velocity, self.lattice.normal))
@@ -122,11 +129,11 @@ class Influence:
 
     def strips(self, nodes: Array, weights: Array, far: Array) -> Array:
         """Velocities (n_weights, 3, n_points, columns) per unit strength of a wake's strips; see `strip_velocities`."""
-        out = np.empty((len(weights), 3, len(self.places), nodes.shape[1] - 1))
+        out = np.empty((len(weights), 3, nodes.shape[1] - 1, len(self.places)))
         drawn = np.ascontiguousarray(nodes * self._drawn)
         strip_velocities(drawn, np.ascontiguousarray(weights), self._far(far), self._core2, self._drawn_places, out)
         out[:, 0] /= self.beta
-        return out
+        return out.transpose(0, 1, 3, 2)
 
     @property
     def _core2(self) -> float:

@@ -132,7 +132,7 @@ class Instant:
         left, right = lattice.beside
         across = (circulation - known[lattice.ahead])[:, None] * np.cross(wind[:p], lattice.across[1])
         along = (known[left] - known[right])[:, None] * np.cross(wind[p:], lattice.along[1])
-        changing = (self.rate(circulation) if rate is None else rate)[:, None] * lattice.ring_area
+        changing = (self.rate(circulation) if rate is None else rate)[:, None] * lattice.load_area
         force, moment = np.zeros((lattice.n_strips + 1, 3)), np.zeros((lattice.n_strips + 1, 3))
 
         def collect(forces: Array, places: Array, strips: Index) -> None:
@@ -140,7 +140,7 @@ class Instant:
             np.add.at(moment, strips, np.cross(places - self.motion.centre, forces))
 
         collect(across, lattice.across[0], lattice.strip)
-        collect(changing, lattice.ring_centre, lattice.strip)
+        collect(changing, lattice.load_centre, lattice.strip)
         # a side between two strips belongs to both by halves, one at a tip to its only one
         strip = np.append(lattice.strip, lattice.n_strips)
         for own, other in ((left, right), (right, left)):

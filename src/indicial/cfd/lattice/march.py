@@ -8,7 +8,8 @@ import numpy as np
 
 from indicial.cfd.lattice.influence import Influence
 from indicial.cfd.lattice.instant import Instant
-from indicial.cfd.lattice.wake import SHED_AT, RigidMotion, WakeSheet, steady_wake
+from indicial.cfd.lattice.shedding import cut, departure
+from indicial.cfd.lattice.wake import RigidMotion, WakeSheet, steady_wake
 from indicial.conventions import Array
 
 WAKE_SPANS = 30.0
@@ -17,24 +18,17 @@ WAKE_SPANS = 30.0
 
 def steady_instant(influence: Influence, motion: RigidMotion, wake_motion: RigidMotion | None = None) -> Instant:
     """The steady flow of a constant motion; the wake may follow another one (a frozen wake)."""
-    return Instant(
-        influence,
-        motion,
-        np.zeros((3, len(influence.places))),
-        _strips(influence, _wakes(influence, wake_motion or motion)),
-    )
+    parts = []
+    for wake in _wakes(influence, wake_motion or motion):
+        weights = np.ones((1, *wake.circulation.shape))
+        parts.append(influence.strips(wake.lines, weights, wake.far)[0])
+    return Instant(influence, motion, np.zeros((3, len(influence.places))), np.concatenate(parts, axis=-1))
 
 
 def _wakes(influence: Influence, motion: RigidMotion) -> list[WakeSheet]:
     size = float(np.max(np.ptp(influence.lattice.corners.reshape(-1, 3), axis=0)))
     first = 0.25 * float(np.min(influence.lattice.strips.chord))
     return [steady_wake(sheet.nodes[-1], motion, first, WAKE_SPANS * size) for sheet in influence.lattice.sheets]
-
-
-def _strips(influence: Influence, wakes: list[WakeSheet]) -> Array:
-    """Velocities per unit circulation along the whole of a strip's wake, shape (3, n_points, S)."""
-    parts = [influence.strips(wake.nodes, np.ones((1, len(wake.nodes))), wake.far)[0] for wake in wakes]
-    return np.concatenate(parts, axis=-1)
 
 
 class March:
@@ -76,32 +70,42 @@ class March:
         return self._earlier[-1][1]
 
     def advance(self, time: float, motion: RigidMotion) -> Instant:
-        """Go on to a time [s] and a motion: the wake is left behind, a new row is shed."""
-        step = time - self._time
+        """Go on to a time [s] and a motion: the wake is left behind, a new line is shed."""
         followed = self._frozen or motion
-        near = np.zeros((3, len(self._influence.places), self._influence.lattice.n_strips))
-        if step > 0.0:
-            matrix, shift = self._motion.mean(followed).carried(step)
-            trailing = self.circulation[self._influence.lattice.trailing]
-            wakes = []
-            for wake, sheet, at in zip(self.wakes, self._influence.lattice.sheets, self._columns, strict=True):
-                edge = sheet.nodes[-1]
-                corners = edge - SHED_AT * step * followed.at(edge)
-                wakes.append(wake.carried(matrix, shift).shed(corners, trailing[at]))
-                fresh = np.stack([edge, corners])
-                near[:, :, at] = self._influence.strips(fresh, np.array([[1.0, 0.0]]), wake.far)[0]
-            self.wakes = wakes
+        influence = self._influence
+        self._leave(time - self._time, followed)
+        near = np.zeros((3, len(influence.places), influence.lattice.n_strips))
+        older = np.zeros((3, len(influence.places)))
+        for wake, sheet, at in zip(self.wakes, influence.lattice.sheets, self._columns, strict=True):
+            rings = cut(wake, sheet.nodes[-1], sheet.last_chord)
+            young = rings.young
+            weights = np.concatenate([rings.share[:young], np.zeros((1, sheet.columns))])[None]
+            near[:, :, at] = influence.strips(rings.nodes[: young + 1], weights, rings.far)[0]
+            older += influence.sheet(rings.nodes, rings.strength, rings.tail, rings.far)
         self._motion, self._time = followed, time
-        older = sum(
-            (self._influence.sheet(wake.nodes, wake.strength, wake.tail, wake.far) for wake in self.wakes),
-            np.zeros((3, len(self._influence.places))),
-        )
         weight, history = self._difference(time)
-        return Instant(self._influence, motion, older, near, history, weight)
+        return Instant(influence, motion, older, near, history, weight)
+
+    def _leave(self, step: float, followed: RigidMotion) -> None:
+        """Leave the wakes behind for a step [s], and begin new lines of a circulation that is not known yet."""
+        matrix, shift = self._motion.mean(followed).carried(step)
+        wakes = []
+        for wake, sheet in zip(self.wakes, self._influence.lattice.sheets, strict=True):
+            edge = sheet.nodes[-1]
+            wind = -followed.at(edge)
+            speed = np.linalg.norm(wind, axis=1)
+            moving = speed[:, None] > 0.0
+            away = np.where(moving, wind / np.where(moving, speed[:, None], 1.0), wake.far)
+            line = departure(edge, away, sheet.last_chord)
+            wakes.append(wake.carried(matrix, shift, step * speed).after(line, np.zeros(sheet.columns)))
+        self.wakes = wakes
 
     def accept(self, circulation: Array) -> None:
         """Keep the circulation (P,) of the instant that was advanced to."""
         self._earlier = [*self._earlier[-1:], (self._time, circulation)]
+        trailing = circulation[self._influence.lattice.trailing]
+        for wake, at in zip(self.wakes, self._columns, strict=True):
+            wake.circulation[0] = trailing[at]
 
     def _difference(self, time: float) -> tuple[float, tuple[tuple[float, Array], ...]]:
         """Weights of dGamma/dt: second order backwards, first order at the first step, none at the first instant."""

@@ -81,6 +81,11 @@ class Sheet:
     strips: Strips
 
     @property
+    def last_chord(self) -> Array:
+        """Length of the last panels along the cuts [m], shape (columns + 1,)."""
+        return np.asarray(np.linalg.norm(self.edges[-1] - self.edges[-2], axis=-1))
+
+    @property
     def rows(self) -> int:
         """Panels along the chord."""
         return len(self.collocation)
@@ -163,6 +168,29 @@ class Lattice:
         """Area vectors of the rings [m^2], along the normal, shape (P, 3)."""
         c = self.corners
         return np.asarray(0.5 * np.cross(c[:, 2] - c[:, 0], c[:, 1] - c[:, 3]))
+
+    @cached_property
+    def load_corners(self) -> Array:
+        """Of the rings, the last one's only as far as its collocation point, shape (P, 4, 3).
+
+        Between there and the trailing edge ``V gamma + dGamma/dt`` is nought, and the filaments do not have that gamma.
+        """
+        c = self.corners.copy()
+        t = self.trailing
+        c[t, 2] = c[t, 1] + (2.0 / 3.0) * (c[t, 2] - c[t, 1])
+        c[t, 3] = c[t, 0] + (2.0 / 3.0) * (c[t, 3] - c[t, 0])
+        return c
+
+    @cached_property
+    def load_area(self) -> Array:
+        """Area vectors on which dGamma/dt acts [m^2], shape (P, 3)."""
+        c = self.load_corners
+        return np.asarray(0.5 * np.cross(c[:, 2] - c[:, 0], c[:, 1] - c[:, 3]))
+
+    @cached_property
+    def load_centre(self) -> Array:
+        """Shape (P, 3)."""
+        return np.asarray(np.mean(self.load_corners, axis=1))
 
     @cached_property
     def ring_centre(self) -> Array:

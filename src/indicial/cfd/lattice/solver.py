@@ -117,7 +117,7 @@ class LatticeSolver:
         A jump of the motion at t = 0 gives an incompressible flow an impulse (its added mass), which no instant's loads
         can show. It is returned as a compressible flow spreads it, over a short while: the loads at t = 0+ have it as a
         triangle that is gone at ``times[1]``, so that integrals of the history over time are right. All else at t = 0+
-        is the limit from later times.
+        is the limit from later times. The time in which the wing goes the length of a panel is not resolved.
         """
         t = np.asarray(times, dtype=float)
         if t.ndim != 1 or t.size < 1 or t[0] != 0.0 or np.any(np.diff(t) <= 0.0) or not np.all(np.isfinite(t)):
@@ -138,8 +138,8 @@ class LatticeSolver:
             kept = [*kept, (instant, circulation)] if n < 2 else kept
         if t.size > 1:
             (first, after_jump), (_, later) = kept
-            changing = (2.0 * (after_jump - settled) + later - after_jump) / t[1]
-            loads[0] = self.coefficients(first.loads(after_jump, changing), condition)
+            loads[0] = self.coefficients(first.loads(after_jump, (later - after_jump) / t[1]), condition)
+            loads[0] += self.coefficients(_impulse(first, start), condition) * 2.0 / t[1]
         return History(
             time=t,
             coefficients=loads,
@@ -167,3 +167,16 @@ class LatticeSolver:
             "wake": self.settings.wake,
             "compressible": int(self.settings.compressible),
         }
+
+
+def _impulse(after: Instant, before: Instant) -> StripLoads:
+    """Impulse of the jump between two instants, loads times seconds."""
+    influence = after.influence
+    lattice = influence.lattice
+    circulation = influence.impulse((before.wind - after.wind)[: lattice.n_panels])
+    pushes = circulation[:, None] * lattice.ring_area
+    turns = np.cross(lattice.ring_centre - after.motion.centre, pushes)
+    force, moment = np.zeros((lattice.n_strips, 3)), np.zeros((lattice.n_strips, 3))
+    np.add.at(force, lattice.strip, pushes)
+    np.add.at(moment, lattice.strip, turns)
+    return StripLoads(force, moment)

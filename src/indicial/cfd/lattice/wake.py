@@ -1,13 +1,12 @@
-r"""Wakes that stay in still air where they were shed.
+r"""Rigid motions, and wakes that stay in still air where they were shed.
 
-In body axes an air particle at rest moves by ``dr/dt = -(V_b + omega x (r - r0))``. At every instant a row of
-corners is shed at a quarter of the way that the trailing edge has gone since the last one (as the bound filaments
-stand at a quarter of their panels), and what circulation the trailing edge had then stays in the ring between two rows.
+In body axes an air particle at rest moves by ``dr/dt = -(V_b + omega x (r - r0))``, and keeps the circulation that the
+panels had when it left.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -19,10 +18,8 @@ WakeModel = Literal["shed", "frozen"]
 """``shed``: in still air, where the body was. ``frozen``: carried along the stream of the flight condition, whatever
 the body does: the wake of linear theory."""
 
-SHED_AT = 0.25
-"""Where a new row stands on the way back to the last one."""
 
-_TURN_STEP = 0.1
+_TURN_STEP = 0.05
 _GROWTH = 1.15
 
 
@@ -54,56 +51,59 @@ class RigidMotion:
 
 @dataclass(frozen=True)
 class WakeSheet:
-    """The wake of one sheet, newest first.
+    """What one sheet has shed: lines of still air, newest first, with the circulation that its columns had then.
 
     Parameters
     ----------
-    nodes : ndarray
-        Corners of its rings (rows + 1, columns + 1, 3), body axes [m].
-    strength : ndarray
-        Circulation of its rings (rows, columns).
-    tail : ndarray
-        Of the strips that go on from the last row to infinity, shape (columns,).
+    lines : ndarray
+        Where they are now, body axes, shape (n, columns + 1, 3) [m].
+    path : ndarray
+        How far they have come since, increasing, shape (n, columns + 1) [m].
+    circulation : ndarray
+        Linear between the lines, constant beyond the last, shape (n, columns) [m^2/s].
     far : ndarray
-        Where to, a unit vector (3,).
+        Where the wake goes on from the last line to infinity, a unit vector (3,).
     """
 
-    nodes: Array
-    strength: Array
-    tail: Array
+    lines: Array
+    path: Array
+    circulation: Array
     far: Array
 
-    def carried(self, matrix: Array, shift: Array) -> WakeSheet:
-        """As it stands in body axes after a time; see `RigidMotion.carried`."""
-        return WakeSheet(self.nodes @ matrix.T + shift, self.strength, self.tail, matrix @ self.far)
+    def carried(self, matrix: Array, shift: Array, gone: Array) -> WakeSheet:
+        """Where it is after a time in which still air has gone from the edge by `gone` (columns + 1,) [m]."""
+        return replace(self, lines=self.lines @ matrix.T + shift, path=self.path + gone, far=matrix @ self.far)
 
-    def shed(self, corners: Array, circulation: Array) -> WakeSheet:
-        """With a new row of corners in front, and a ring of the circulation (columns,) behind it."""
-        nodes = np.concatenate([corners[None], self.nodes])
-        return WakeSheet(nodes, np.concatenate([circulation[None], self.strength]), self.tail, self.far)
+    def after(self, line: Array, circulation: Array) -> WakeSheet:
+        """With a new line in front."""
+        return WakeSheet(
+            np.concatenate([line[None], self.lines]),
+            np.concatenate([np.zeros((1, len(line))), self.path]),
+            np.concatenate([circulation[None], self.circulation]),
+            self.far,
+        )
 
     def with_circulation(self, circulation: Array) -> WakeSheet:
-        """All along of the same circulation (columns,), as in steady flow."""
-        return WakeSheet(self.nodes, np.tile(circulation, (len(self.nodes) - 1, 1)), circulation, self.far)
+        """All of the same circulation (columns,), as in steady flow."""
+        return replace(self, circulation=np.tile(circulation, (len(self.lines), 1)))
 
 
 def steady_wake(edge: Array, motion: RigidMotion, first: float, length: float) -> WakeSheet:
     """The wake of a body in steady motion, of no circulation yet.
 
-    Straight to infinity without rotation; with it on helices, by rows of `first` [m] and longer, a tenth of a radian at
-    most, until `length` [m], and straight on from there.
+    Straight to infinity without rotation; with it on helices, by lines `first` [m] apart and more, a twentieth of a
+    radian at most, until `length` [m], and straight on from there.
     """
-    empty = np.zeros((0, edge.shape[0] - 1)), np.zeros(edge.shape[0] - 1)
     turning = float(np.linalg.norm(motion.rate))
-    speed = max(float(np.linalg.norm(motion.at(point))) for point in edge)
-    if turning == 0.0 or turning * length < 1e-12 * speed:
-        return WakeSheet(edge[None], *empty, -motion.velocity / np.linalg.norm(motion.velocity))
-    rows, gone, step = [edge], 0.0, first / speed
-    while gone * speed < length:
-        matrix, shift = motion.carried(step)
-        rows.append(rows[-1] @ matrix.T + shift)
-        gone += step
-        step = min(_GROWTH * step, _TURN_STEP / turning)
-    nodes = np.stack(rows)
-    away = -np.mean(motion.at(nodes[-1]), axis=0)
-    return WakeSheet(nodes, np.zeros((len(nodes) - 1, edge.shape[0] - 1)), empty[1], away / np.linalg.norm(away))
+    speed = np.linalg.norm(motion.at(edge), axis=1)
+    fastest = float(np.max(speed))
+    lines, path, step = [edge], [np.zeros(len(edge))], first / fastest
+    if turning * length > 1e-12 * fastest:
+        while np.max(path[-1]) < length:
+            matrix, shift = motion.carried(step)
+            lines.append(lines[-1] @ matrix.T + shift)
+            path.append(path[-1] + step * speed)
+            step = min(_GROWTH * step, _TURN_STEP / turning)
+    away = -np.mean(motion.at(lines[-1]), axis=0)
+    nothing = np.zeros((len(lines), len(edge) - 1))
+    return WakeSheet(np.stack(lines), np.stack(path), nothing, away / np.linalg.norm(away))
