@@ -26,9 +26,11 @@ def steady_instant(influence: Influence, motion: RigidMotion, wake_motion: Rigid
 
 
 def _wakes(influence: Influence, motion: RigidMotion) -> list[WakeSheet]:
-    size = float(np.max(np.ptp(influence.lattice.corners.reshape(-1, 3), axis=0)))
     first = 0.25 * float(np.min(influence.lattice.strips.chord))
-    return [steady_wake(sheet.nodes[-1], motion, first, WAKE_SPANS * size) for sheet in influence.lattice.sheets]
+    return [
+        steady_wake(sheet.nodes[-1], motion, first, WAKE_SPANS * influence.lattice.size)
+        for sheet in influence.lattice.sheets
+    ]
 
 
 class March:
@@ -88,7 +90,8 @@ class March:
 
     def _leave(self, step: float, followed: RigidMotion) -> None:
         """Leave the wakes behind for a step [s], and begin new lines of a circulation that is not known yet."""
-        matrix, shift = self._motion.mean(followed).carried(step)
+        mean = self._motion.mean(followed)
+        matrix, shift = mean.carried(step)
         wakes = []
         for wake, sheet in zip(self.wakes, self._influence.lattice.sheets, strict=True):
             edge = sheet.nodes[-1]
@@ -97,7 +100,8 @@ class March:
             moving = speed[:, None] > 0.0
             away = np.where(moving, wind / np.where(moving, speed[:, None], 1.0), wake.far)
             line = departure(edge, away, sheet.last_chord)
-            wakes.append(wake.carried(matrix, shift, step * speed).after(line, np.zeros(sheet.columns)))
+            carried = wake.carried(matrix, shift, step * np.linalg.norm(mean.at(edge), axis=1))
+            wakes.append(carried.after(line, np.zeros(sheet.columns), away))
         self.wakes = wakes
 
     def accept(self, circulation: Array) -> None:

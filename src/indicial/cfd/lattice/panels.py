@@ -140,6 +140,11 @@ class Lattice:
         return len(self.normal)
 
     @cached_property
+    def size(self) -> float:
+        """Largest extent along an axis [m]."""
+        return float(np.max(np.ptp(self.corners.reshape(-1, 3), axis=0)))
+
+    @cached_property
     def n_strips(self) -> int:
         """S."""
         return sum(sheet.columns for sheet in self.sheets)

@@ -1,9 +1,9 @@
 r"""How a wake joins the lattice that sheds it, and how it is cut into rings.
 
-A lattice whose filaments stand at a quarter of equal panels of length d and whose boundary condition holds midway is
-a quadrature rule: a filament stands for the vorticity half a panel to both of its sides. So the circulation that the
-panels sum to is that of the sheet up to the last collocation point, d/4 ahead of the trailing edge. There the wake begins:
-its circulation at a distance x' behind *that* point is what the panels summed to when the wind was there. The
+A lattice whose filaments stand at a quarter of equal panels of length d, and whose boundary condition holds midway,
+is a quadrature rule: a filament stands for the vorticity half a panel to both of its sides. So the circulation that the
+panels sum to is that of the sheet up to the last collocation point, d/4 ahead of the trailing edge. There the wake
+begins: its circulation at a distance x' behind *that* point is what the panels summed to when the wind was there. The
 lattice goes on in the wake with rings from (m - 1/2) d to (m + 1/2) d, whatever the time step, each with its mean of
 the circulations, linear in time between the instants; the first is the panels' last. Farther back they may be longer
 in proportion to their distance.
@@ -94,7 +94,7 @@ def cut(wake: WakeSheet, edge: Array, chord: Array) -> Rings:
     n, columns = len(relative), len(edge) - 1
     nodes, strength, share = np.empty((n + 1, columns + 1, 3)), np.zeros((n, columns)), np.zeros((n, columns))
     nodes[0], share[0] = edge, 1.0
-    _place(wake.lines, wake.path, wake.far, relative, chord, nodes)
+    _place(wake.lines, wake.path, wake.tangent, wake.far, relative, chord, nodes)
     _mean(wake.path, wake.circulation, relative, chord, strength, share)
     return Rings(nodes, strength, share, wake.circulation[-1], wake.far)
 
@@ -103,8 +103,8 @@ _SERIAL = {**KERNEL, "parallel": False}
 
 
 @njit(**_SERIAL)
-def _place(lines, path, far, relative, chord, nodes):  # type: ignore[no-untyped-def]
-    """Corners of rings at distances ``relative * chord``, linear between the lines and along `far` beyond."""
+def _place(lines, path, tangent, far, relative, chord, nodes):  # type: ignore[no-untyped-def]
+    """Corners of rings at distances ``relative * chord``, cubic between the lines and along `far` beyond."""
     last = lines.shape[0] - 1
     for j in range(lines.shape[1]):
         i = 0
@@ -116,9 +116,13 @@ def _place(lines, path, far, relative, chord, nodes):  # type: ignore[no-untyped
                 for c in range(3):
                     nodes[r + 1, j, c] = lines[i, j, c] + (x - path[i, j]) * far[c]
             else:
-                w = (x - path[i, j]) / (path[i + 1, j] - path[i, j])
+                length = path[i + 1, j] - path[i, j]
+                w = (x - path[i, j]) / length
+                v = 1.0 - w
                 for c in range(3):
-                    nodes[r + 1, j, c] = (1.0 - w) * lines[i, j, c] + w * lines[i + 1, j, c]
+                    ends = v * v * (1.0 + 2.0 * w) * lines[i, j, c] + w * w * (1.0 + 2.0 * v) * lines[i + 1, j, c]
+                    slopes = v * v * w * tangent[i, j, c] - w * w * v * tangent[i + 1, j, c]
+                    nodes[r + 1, j, c] = ends + length * slopes
 
 
 @njit(**_SERIAL)

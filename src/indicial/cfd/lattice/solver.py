@@ -12,11 +12,14 @@ from numpy.typing import ArrayLike
 from indicial import __version__
 from indicial.cfd.lattice.influence import Influence
 from indicial.cfd.lattice.instant import Instant, StripLoads
+from indicial.cfd.lattice.linear import LinearLattice
+from indicial.cfd.lattice.linear_response import frequency_response
 from indicial.cfd.lattice.march import March, steady_instant
 from indicial.cfd.lattice.panels import Lattice
 from indicial.cfd.lattice.wake import RigidMotion, WakeModel
 from indicial.conventions import Array, ReferenceQuantities, mesh_from_body
 from indicial.errors import InputError
+from indicial.frequency import INPUTS, FrequencyResponse, check_inputs, reduced_frequencies
 from indicial.history import History
 from indicial.motion import FlightCondition, Motion, Rates
 from indicial.solver import SteadyLoads
@@ -151,6 +154,39 @@ class LatticeSolver:
             motion=motion.describe(),
             provenance=self._provenance(),
         )
+
+    def linearise(self, condition: FlightCondition) -> LinearLattice:
+        """The lattice linearised about steady flight at a condition, without rotation.
+
+        The wake is that of the settings: one that is shed is displaced by the disturbance too.
+        """
+        motion = self.motion(condition.velocity, np.zeros(3))
+        baseline = self.steady(condition).coefficients
+        return LinearLattice.about(
+            self.influence(condition),
+            motion,
+            baseline,
+            condition,
+            self._reference,
+            shed=self.settings.wake == "shed",
+        )
+
+    def frequency_response(
+        self, condition: FlightCondition, k: ArrayLike = (), inputs: tuple[str, ...] | None = None
+    ) -> FrequencyResponse:
+        """H(ik) from motion to the six loads at reduced frequencies `k`, with H(0) and H'(0).
+
+        An incompressible flow follows a jump with an impulse: `direct` is that of alphadot, and not a number for what
+        has none.
+
+        Raises
+        ------
+        InputError
+            If a frequency is negative or not finite, or an input is unknown.
+        """
+        names, ks = INPUTS if inputs is None else inputs, reduced_frequencies(k)
+        check_inputs(names)
+        return frequency_response(self.linearise(condition), names, ks, self._provenance())
 
     def coefficients(self, loads: StripLoads, condition: FlightCondition) -> Array:
         """The six coefficients of all strips together, shape (6,)."""

@@ -61,6 +61,9 @@ class WakeSheet:
         How far they have come since, increasing, shape (n, columns + 1) [m].
     circulation : ndarray
         Linear between the lines, constant beyond the last, shape (n, columns) [m^2/s].
+    tangent : ndarray
+        Where the wind blew from each point of a line when it left, turned with the air since: the derivative of the
+        lines along the path, shape (n, columns + 1, 3).
     far : ndarray
         Where the wake goes on from the last line to infinity, a unit vector (3,).
     """
@@ -68,18 +71,26 @@ class WakeSheet:
     lines: Array
     path: Array
     circulation: Array
+    tangent: Array
     far: Array
 
     def carried(self, matrix: Array, shift: Array, gone: Array) -> WakeSheet:
         """Where it is after a time in which still air has gone from the edge by `gone` (columns + 1,) [m]."""
-        return replace(self, lines=self.lines @ matrix.T + shift, path=self.path + gone, far=matrix @ self.far)
+        return replace(
+            self,
+            lines=self.lines @ matrix.T + shift,
+            path=self.path + gone,
+            tangent=self.tangent @ matrix.T,
+            far=matrix @ self.far,
+        )
 
-    def after(self, line: Array, circulation: Array) -> WakeSheet:
+    def after(self, line: Array, circulation: Array, tangent: Array) -> WakeSheet:
         """With a new line in front."""
         return WakeSheet(
             np.concatenate([line[None], self.lines]),
             np.concatenate([np.zeros((1, len(line))), self.path]),
             np.concatenate([circulation[None], self.circulation]),
+            np.concatenate([tangent[None], self.tangent]),
             self.far,
         )
 
@@ -106,4 +117,6 @@ def steady_wake(edge: Array, motion: RigidMotion, first: float, length: float) -
             step = min(_GROWTH * step, _TURN_STEP / turning)
     away = -np.mean(motion.at(lines[-1]), axis=0)
     nothing = np.zeros((len(lines), len(edge) - 1))
-    return WakeSheet(np.stack(lines), np.stack(path), nothing, away / np.linalg.norm(away))
+    found = np.stack(lines)
+    tangent = -motion.at(found) / speed[:, None]
+    return WakeSheet(found, np.stack(path), nothing, tangent, away / np.linalg.norm(away))
