@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 
 from indicial.conventions import Array, ReferenceQuantities
 from indicial.motion import FlightCondition
-from indicial.rom import StateSpaceModel, Stream, advance, stream
+from indicial.rom import ConvolutionModel, StateSpaceModel, Stream, advance, stream
 from indicial.rom.signals import MotionInputs
 
 SAMPLES, STEP = 100_000, 0.05
@@ -20,7 +20,7 @@ OUTPUTS = ("CA", "CY", "CN", "Cl", "Cm", "Cn")
 
 def measure() -> list[Figure]:
     """Time all of it on this machine."""
-    return [*_long_response(), *_exponentials(), *_streaming()]
+    return [*_long_response(), *_exponentials(), *_superposition(), *_streaming()]
 
 
 def ten_states() -> StateSpaceModel:
@@ -99,6 +99,23 @@ def _exponentials() -> list[Figure]:
         Figure.at_most("time / that of scipy.signal.lfilter, one for each", own / peer, 1.0),
         Figure("time / that of one lfilter of fourth order", own / joined, ""),
         Figure.at_most("difference from lfilter, of the input's peak", difference, 1e-9),
+    ]
+
+
+def _superposition() -> list[Figure]:
+    """Eq. (13) with 150 samples of each response, by direct sums and by transforms."""
+    s = np.concatenate([[0.0], np.geomspace(1e-2, 60.0, 149)])
+    motion = _motion(3)
+    short = MotionInputs(motion.s[:5000], motion.values[:5000], motion.before)
+    steps = ten_states().step(s)
+    direct, fast = (ConvolutionModel(steps, evaluation=kind) for kind in ("direct", "fft"))
+    exact = direct.respond(short)
+    difference = np.max(np.abs(fast.respond(short) - exact)) / np.max(np.abs(exact))
+    ratio = best_time(lambda: direct.respond(short), 1) / best_time(lambda: fast.respond(short), 7)
+    return [
+        Figure("direct sums / transforms, 5,000 samples", ratio, ""),
+        Figure.at_most("difference between them, of the peak", difference, 1e-9),
+        Figure("transforms, 100,000 samples", 1e3 * best_time(lambda: fast.respond(motion), 5), "ms"),
     ]
 
 

@@ -11,7 +11,15 @@ from indicial.conventions import Array, time_from_reduced, velocity_from_angles
 from indicial.derivatives import DerivativeTable
 from indicial.errors import InputError, NoLimitError
 from indicial.motion import AlphaStep, FlightCondition, PitchOscillation, Rates, TabulatedMotion
-from indicial.rom import ConvolutionModel, QuasiSteadyModel, StepResponse, StepResponses, quasi_steady_error
+from indicial.rom import (
+    ConvolutionModel,
+    QuasiSteadyModel,
+    StateSpaceModel,
+    StepResponse,
+    StepResponses,
+    quasi_steady_error,
+)
+from indicial.rom.response import Interpolation
 from indicial.rom.signals import MotionInputs
 from indicial.solver import Solver
 from rom.cases import CONDITION, OUTPUTS, REFERENCE, ROWS, graded, known_system, plate, responses
@@ -38,6 +46,41 @@ def test_ramp_through_piecewise_linear_response_is_exact() -> None:
     nodes = [np.sort(np.append(s[s < end], end)) for end in at]
     exact = [0.7 * np.trapezoid(np.interp(x, s, a), x) for x in nodes]
     np.testing.assert_allclose(model.respond(inputs)[:, 0], exact, rtol=1e-13, atol=1e-13)
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "cubic"])
+@pytest.mark.parametrize(("samples", "step"), [(2, 0.5), (700, 0.11), (700, 2.0), (700, 70.0)])
+def test_transforms_give_the_numbers_of_the_direct_sum(interpolation: Interpolation, samples: int, step: float) -> None:
+    # grids within the response, beyond its end, and with the whole of it in one step
+    data = responses(known_system(), CONDITION, GRID)
+    rng = np.random.default_rng(8)
+    inputs = MotionInputs(step * np.arange(samples), rng.normal(size=(samples, 2)), rng.normal(size=2))
+    direct = ConvolutionModel(data, interpolation, "direct").respond(inputs)
+    fast = ConvolutionModel(data, interpolation, "fft").respond(inputs)
+    np.testing.assert_allclose(fast, direct, atol=1e-12 * np.max(np.abs(direct)))
+
+
+def test_transforms_are_refused_on_uneven_instants() -> None:
+    model = ConvolutionModel(piecewise_linear()[0], evaluation="fft")
+    with pytest.raises(InputError, match="uniform"):
+        model.respond(MotionInputs(np.array([0.0, 1.0, 1.5]), np.zeros((3, 1)), np.zeros(1)))
+    with pytest.raises(InputError, match="must be 'auto'"):
+        ConvolutionModel(piecewise_linear()[0], evaluation="magic")  # type: ignore[arg-type]
+
+
+def test_recursion_agrees_with_superposition_of_the_same_exponentials() -> None:
+    a, b, c = np.diag([-0.2, -0.7]), np.ones((2, 1)), np.array([[1.0, -0.4]])
+    recursive = StateSpaceModel(a, b, c, np.ones((1, 1)), ("alpha",), ("CN",), np.zeros(6), CONDITION, REFERENCE)
+    rng = np.random.default_rng(9)
+    for s in (0.05 * np.arange(900), np.sort(rng.uniform(0.0, 50.0, 900))):
+        inputs = MotionInputs(s, np.cumsum(rng.normal(size=(900, 1)), axis=0), np.zeros(1))
+        errors = []
+        for count in (400, 800):
+            model = ConvolutionModel(recursive.step(graded(150.0, count)))
+            errors.append(np.max(np.abs(model.respond(inputs) - recursive.respond(inputs))))
+        # what is left is the interpolation of the step responses
+        assert errors[1] < 1e-6 * np.max(np.abs(inputs.values))
+        assert errors[0] / errors[1] > 8.0
 
 
 def test_jump_at_the_start_gives_the_step_response_itself() -> None:

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import PPoly
+from scipy.signal import oaconvolve
 from scipy.special import spherical_jn
 
 from indicial.conventions import Array
+from indicial.errors import InputError
 from indicial.rom.model import ComplexArray, ReducedModel
 from indicial.rom.response import Interpolation, StepResponses
 from indicial.rom.signals import MotionInputs
 
 _CHUNK = 2_000_000  # kernel values held at a time
+_MANY = 256  # samples from which transforms are quicker
+
+Evaluation = Literal["auto", "direct", "fft"]
 
 
 def deficiency_load(curve: PPoly, s: Array, values: Array, before: float, at: Array) -> Array:
@@ -54,6 +59,27 @@ def deficiency_load(curve: PPoly, s: Array, values: Array, before: float, at: Ar
     return load
 
 
+def deficiency_load_fft(curve: PPoly, s: Array, values: Array, before: float) -> Array:
+    r"""The same as `deficiency_load` at every sample of a uniform grid, by fast convolution, shape (n, m).
+
+    ``u' = du_j/h`` on each interval makes the integral the sum over j of ``du_j`` times the mean of F over the
+    interval of lags ``(i - j - 1) h`` to ``(i - j) h``.
+    """
+    end, step = curve.x[-1], (s[-1] - s[0]) / (s.size - 1)
+    reach = min(s.size, int(np.ceil(end / step)) + 1)
+    integral = curve.antiderivative()(np.minimum(step * np.arange(reach), end))
+    lags = step * np.arange(s.size)
+    load: Array = (values[0] - before) * np.where((lags <= end)[:, None], curve(np.minimum(lags, end)), 0.0)
+    load[1:] += oaconvolve(np.diff(values)[:, None], np.diff(integral, axis=0) / step, axes=0)[: s.size - 1]
+    return load
+
+
+def is_uniform(s: Array) -> bool:
+    """Whether the steps of a grid differ by the round-off of its instants only."""
+    step = np.diff(s)
+    return step.size > 0 and bool(np.ptp(step) <= 8.0 * np.finfo(float).eps * np.max(np.abs(s)))
+
+
 def deficiency_transform(curve: PPoly, k: Array) -> ComplexArray:
     r"""``ik times the integral of F(s) exp(-iks) over [0, S]``, exactly, shape (n_k, m).
 
@@ -84,19 +110,26 @@ class ConvolutionModel(ReducedModel):
 
     Evaluated as ``A(inf) (u - u(0-)) - F(s) du(0+) - integral of F(s - sigma) u' d sigma``, F the deficiency
     function (14), (15), zero after the last sample. Exact for inputs that are linear between samples, jumps
-    at the start included. Cost is samples times loads wanted.
+    at the start included. Directly, on any grid, the cost is samples times loads wanted; on a uniform grid the same
+    numbers come from fast Fourier transforms. The third way, by recursion, is a model of exponential sums:
+    `StateSpaceModel`.
 
     Parameters
     ----------
     responses : StepResponses
     interpolation : {"cubic", "linear"}
         Between the samples of the step responses; cubic is monotone.
+    evaluation : {"auto", "direct", "fft"}
+        ``auto`` takes transforms for many samples on a uniform grid.
     """
 
     responses: StepResponses
     interpolation: Interpolation = "cubic"
+    evaluation: Evaluation = "auto"
 
     def __post_init__(self) -> None:
+        if self.evaluation not in ("auto", "direct", "fft"):
+            raise InputError(f"evaluation is {self.evaluation!r}, must be 'auto', 'direct' or 'fft'")
         for name in ("inputs", "outputs", "baseline", "condition", "reference"):
             object.__setattr__(self, name, getattr(self.responses, name))
         self._check_names()
@@ -127,11 +160,25 @@ class ConvolutionModel(ReducedModel):
         return response
 
     def respond(self, inputs: MotionInputs) -> Array:
-        """Loads less `baseline` under `inputs`, shape (n, n_outputs)."""
-        at = inputs.s[:: inputs.stride]
-        load = inputs.values[:: inputs.stride] @ self.static_gain.T
+        """Loads less `baseline` under `inputs`, shape (n, n_outputs).
+
+        Raises
+        ------
+        InputError
+            If transforms are asked for and the grid is not uniform.
+        """
+        s, stride = inputs.s, inputs.stride
+        uniform = is_uniform(s)
+        if self.evaluation == "fft" and not uniform:
+            raise InputError("evaluation 'fft' needs uniform instants, these are not: take 'auto' or 'direct'")
+        fast = self.evaluation == "fft" or (self.evaluation == "auto" and uniform and s.size > _MANY)
+        load: Array = inputs.values[::stride] @ self.static_gain.T
         for j, curve in enumerate(self._curves):
-            load -= deficiency_load(curve, inputs.s, inputs.values[:, j], inputs.before[j], at)
+            values, before = inputs.values[:, j], inputs.before[j]
+            if fast:
+                load -= deficiency_load_fft(curve, s, values, before)[::stride]
+            else:
+                load -= deficiency_load(curve, s, values, before, s[::stride])
         return load
 
     def describe(self) -> dict[str, Any]:

@@ -78,17 +78,21 @@ class Portable:
     def notes(self) -> list[str]:
         """What whoever uses the model must know, in lines of text."""
         reference, condition = self.model.reference, self.model.condition
-        x, y, z = reference.moment_reference
-        roll, pitch, yaw = reference.moment_lengths
+        x, y, z = map(_exact, reference.moment_reference)
+        area, length = _exact(reference.area), _exact(reference.length)
+        alpha, beta = _exact(condition.alpha), _exact(condition.beta)
+        lengths = ", ".join(map(_exact, reference.moment_lengths))
         return [
-            f"Unsteady aerodynamic loads at Mach {condition.mach:g}, linear about alpha = {float(condition.alpha)!r} rad, "
-            f"beta = {float(condition.beta)!r} rad.",
+            f"Unsteady aerodynamic loads at Mach {condition.mach:g}, linear about alpha = {alpha}, beta = {beta} rad.",
             "Body axes: x forward, y right, z down, origin at the moment reference point, which lies",
-            f"({float(x)!r}, {float(y)!r}, {float(z)!r}) m from the nose in mesh axes (x aft, y right, z up).",
-            f"Reference area {float(reference.area)!r} m2; lengths of Cl, Cm, Cn: {float(roll)!r}, {float(pitch)!r}, {float(yaw)!r} m; "
-            f"length of reduced time {float(reference.length)!r} m.",
+            f"({x}, {y}, {z}) m from the nose in mesh axes (x aft, y right, z up).",
+            f"Reference area {area} m2; lengths of Cl, Cm, Cn: {lengths} m; length of reduced time {length} m.",
             f"{self.model.order} states. Inputs: "
             + "; ".join(f"{name} [{self.unit(name)}], {MEANING[name]}" for name in self.model.inputs)
             + ".",
             f"Unsteady: {', '.join(self.model.outputs)}; the other coefficients stay at their steady values.",
         ]
+
+
+def _exact(value: float) -> str:
+    return repr(float(value))
