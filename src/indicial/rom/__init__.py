@@ -13,6 +13,7 @@ from indicial.rom.realisation import realise
 from indicial.rom.response import StepResponse, StepResponses
 from indicial.rom.state_space import Candidate, ChannelError, StateSpaceModel
 from indicial.rom.streaming import Stream, advance, stream
+from indicial.rom.uncertainty import PredictedBand, UncertainModel, refine_model
 
 __all__ = [
     "Candidate",
@@ -24,6 +25,7 @@ __all__ = [
     "DeficiencyIntegral",
     "HeldOut",
     "OrderTrial",
+    "PredictedBand",
     "PredictionCheck",
     "Projection",
     "QuasiSteadyError",
@@ -34,6 +36,7 @@ __all__ = [
     "StepResponses",
     "Stream",
     "Truncation",
+    "UncertainModel",
     "advance",
     "check_prediction",
     "compare",
@@ -43,6 +46,7 @@ __all__ = [
     "project",
     "quasi_steady_error",
     "realise",
+    "refine_model",
     "stream",
     "truncate",
 ]

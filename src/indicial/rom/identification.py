@@ -84,7 +84,7 @@ def identify(
     if direct is not None and np.shape(direct) != (len(outputs), len(inputs)):
         raise InputError(f"direct has shape {np.shape(direct)}, must be {(len(outputs), len(inputs))}")
     step = _time_step(histories)
-    records = [_record(history, inputs, outputs, substeps) for history in histories]
+    records = [record_of(history, inputs, outputs, substeps) for history in histories]
     for j, name in enumerate(inputs):
         if max(np.ptp(record.inputs.values[:, j]) for record in records) == 0.0:
             raise InputError(f"no history moves {name}")
@@ -116,7 +116,8 @@ def _time_step(histories: Sequence[History]) -> float:
     return step
 
 
-def _record(history: History, inputs: tuple[str, ...], outputs: tuple[str, ...], substeps: int) -> Record:
+def record_of(history: History, inputs: tuple[str, ...], outputs: tuple[str, ...], substeps: int) -> Record:
+    """What a history says of some outputs under some inputs, less the steady state that it starts from."""
     moved = MotionInputs.from_history(history, inputs, history.condition, substeps=substeps)
     columns = [COEFFICIENTS.index(name) for name in outputs]
     from_rest = MotionInputs(moved.s, moved.values - moved.before, np.zeros(len(inputs)), moved.stride)

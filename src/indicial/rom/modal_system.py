@@ -160,8 +160,8 @@ def fit_rank_one(modes: Modes, records: Sequence[Record], scale: Array, direct: 
 
 
 @dataclass(frozen=True)
-class _Parameters:
-    """Which entries of a vector are poles, B, C and D."""
+class Parameters:
+    """Which entries of a vector are poles (logarithms), B, C and D."""
 
     like: ModalSystem
     free_direct: bool
@@ -203,7 +203,7 @@ def refine(
     evaluations : int
         Most evaluations of the misfit.
     """
-    which = _Parameters(start, free_direct)
+    which = Parameters(start, free_direct)
 
     def misfit(vector: Array) -> Array:
         system = which.unpack(vector)
@@ -211,7 +211,9 @@ def refine(
 
     def jacobian(vector: Array) -> Array:
         system = which.unpack(vector)
-        return np.vstack([_jacobian(system, record, scale, free_direct) for record in records])
+        return np.vstack(
+            [load_slopes(system, record, scale, free_direct=free_direct).reshape(-1, vector.size) for record in records]
+        )
 
     found = least_squares(misfit, which.pack(start), jacobian, xtol=1e-9, ftol=1e-9, gtol=1e-14, max_nfev=evaluations)
     best = which.unpack(found.x)
@@ -223,8 +225,8 @@ def _misfit(system: ModalSystem, record: Record, scale: Array) -> Array:
     return np.asarray(((system.respond(record.inputs) - record.loads) * weight).ravel())
 
 
-def _jacobian(system: ModalSystem, record: Record, scale: Array, free_direct: bool) -> Array:
-    """Changes of the weighted loads with poles, B, C and D, shape (n n_outputs, n_parameters)."""
+def load_slopes(system: ModalSystem, record: Record, scale: Array, *, free_direct: bool) -> Array:
+    """Changes of the weighted loads with each of the `Parameters`, shape (n, n_outputs, n_parameters)."""
     modes, (p, m) = system.modes, system.d.shape
     u = record.inputs.values[:: record.inputs.stride]
     states = _driven(modes, system.b, record.inputs).sum(axis=0)
@@ -241,4 +243,5 @@ def _jacobian(system: ModalSystem, record: Record, scale: Array, free_direct: bo
     if free_direct:
         columns.append(np.einsum("nj,op->nopj", u, np.eye(p)).reshape(len(u), p, -1))
     weight = np.sqrt(record.weights)[:, None] / scale
-    return np.asarray((np.concatenate(columns, axis=2) * weight[..., None]).reshape(len(u) * p, -1))
+    weighted: Array = np.concatenate(columns, axis=2) * weight[..., None]
+    return weighted
