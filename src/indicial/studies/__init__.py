@@ -16,8 +16,9 @@ def find_study(name: str) -> Study:
     """
     from indicial.errors import InputError
     from indicial.studies.finner import STUDY as FINNER
+    from indicial.studies.plate import STUDY as PLATE
 
-    known = {study.name: study for study in (FINNER,)}
+    known = {study.name: study for study in (FINNER, PLATE)}
     if name not in known:
         raise InputError(f"no study {name!r}; there are {', '.join(known)}")
     return known[name]

@@ -225,4 +225,5 @@ class SupersonicPlate:
         size = self.chord * self.span / self.reference.area
         rate = self.chord / condition.speed / self.reference.rate_scale(condition.speed)[1]
         rows = np.array([size, size * self.chord / self.reference.length])[:, None]
-        return rows * np.array([[h[0], h[2] * rate], [h[1], h[3] * rate]])
+        response: NDArray[np.complex128] = rows * np.array([[h[0], h[2] * rate], [h[1], h[3] * rate]])
+        return response
