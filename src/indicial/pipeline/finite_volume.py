@@ -17,6 +17,7 @@ from indicial.pipeline.pool import Fraction
 from indicial.report.space import FlowPicture
 from indicial.rom.modal import ModalForm
 from indicial.rom.simulation import simulate
+from indicial.rom.superposition import superpose
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,7 @@ def compile_kernels() -> None:
     lag = ModalForm.of(-one, one, one, one)
     if lag is not None:
         lag.respond(two, np.ones((2, 1)), np.zeros(1))
+    superpose(two, np.ones((1, 1, 1)), two, two, two)
     condition = FlightCondition(2.0)
     reference = ReferenceQuantities(1.0, 1.0)
     solver = FiniteVolumeSolver(box_mesh((3, 3, 3)), reference, FlowSettings(1e-2, 2, 0.5))

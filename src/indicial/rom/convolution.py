@@ -17,8 +17,8 @@ from indicial.errors import InputError
 from indicial.rom.model import ComplexArray, ReducedModel
 from indicial.rom.response import Interpolation, StepResponses
 from indicial.rom.signals import MotionInputs
+from indicial.rom.superposition import superpose
 
-_CHUNK = 2_000_000  # kernel values held at a time
 _MANY = 256  # samples from which transforms are quicker
 
 Evaluation = Literal["auto", "direct", "fft"]
@@ -27,8 +27,8 @@ Evaluation = Literal["auto", "direct", "fft"]
 def deficiency_load(curve: PPoly, s: Array, values: Array, before: float, at: Array) -> Array:
     r"""``F(s - s0) du(0+) + integral of F(s - sigma) u'(sigma) d sigma``, exactly, for piecewise-linear u.
 
-    With ``J`` the integral of F from 0, u' constant on each interval turns the integral into the sum over samples of
-    ``J(s - s_j)`` times the change of slope there.
+    With J the integral of F from 0 and u' constant on each interval, the integral is a sum over the intervals of u'
+    times differences of J.
 
     Parameters
     ----------
@@ -39,23 +39,16 @@ def deficiency_load(curve: PPoly, s: Array, values: Array, before: float, at: Ar
     before : float
         u before the first sample.
     at : ndarray
-        Reduced times wanted, shape (k,), not before ``s[0]``.
+        Reduced times wanted, increasing, shape (k,), not before ``s[0]``.
 
     Returns
     -------
     ndarray
         Shape (k, m).
     """
-    end = curve.x[-1]
-    slope = np.diff(values) / np.diff(s)
-    change = np.diff(slope, prepend=0.0, append=0.0)
-    integral = curve.antiderivative()
+    end, integral = curve.x[-1], curve.antiderivative()
     load: Array = (values[0] - before) * np.where((at - s[0] <= end)[:, None], curve(np.minimum(at - s[0], end)), 0.0)
-    rows = max(1, _CHUNK // s.size)
-    for start in range(0, at.size, rows):
-        block = slice(start, start + rows)
-        age = np.clip(at[block, None] - s[None, :], 0.0, end)
-        load[block] += np.einsum("ijm,j->im", integral(age), change)
+    load += superpose(integral.x, np.ascontiguousarray(integral.c), s, np.ascontiguousarray(values), at)
     return load
 
 
@@ -110,9 +103,9 @@ class ConvolutionModel(ReducedModel):
 
     Evaluated as ``A(inf) (u - u(0-)) - F(s) du(0+) - integral of F(s - sigma) u' d sigma``, F the deficiency
     function (14), (15), zero after the last sample. Exact for inputs that are linear between samples, jumps
-    at the start included. Directly, on any grid, the cost is samples times loads wanted; on a uniform grid the same
-    numbers come from fast Fourier transforms. The third way, by recursion, is a model of exponential sums:
-    `StateSpaceModel`.
+    at the start included. Directly, on any grid, the cost is loads wanted times samples within the memory; on a
+    uniform grid the same numbers come from fast Fourier transforms. The third way, by recursion, is a model of
+    exponential sums: `StateSpaceModel`.
 
     Parameters
     ----------
