@@ -14,6 +14,7 @@ from indicial.rom import Comparison, ConvolutionModel, compare
 from indicial.rom.comparison import frequency_response, noise_history
 from indicial.solver import Solver
 from rom.cases import COLUMNS, CONDITION, OUTPUTS, REFERENCE, ROWS, graded, known_system, responses
+from rom.linearised import known_flow
 
 METHODS = {
     "exponential", "exponential, shared poles", "modal", "modal, shared poles", "era", "vector fitting", "okid + era",
@@ -83,3 +84,13 @@ def test_a_realisation_that_cannot_be_made_is_told_with_the_reason() -> None:
         found["projection"]
     assert found.data.outputs == OUTPUTS
     assert found.data.reference == REFERENCE
+
+
+def test_a_linearised_flow_is_projected_beside_the_others() -> None:
+    data = responses(known_system(), CONDITION, graded(120.0, 150))
+    seen, baseline = oscillation(known_system(), CONDITION, 0.2), known_flow().baseline
+    # the flow's own loads in the steady state
+    shift = baseline - data.baseline
+    seen = replace(seen, coefficients=seen.coefficients + shift, before=seen.before + shift)
+    found = compare(replace(data, baseline=baseline), [seen], flow=known_flow(), k_max=1.0, max_order=2)
+    assert found["projection"].error < 2e-3

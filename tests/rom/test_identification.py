@@ -108,11 +108,23 @@ def test_twenty_random_systems_with_2_percent_noise_are_stable_and_predicted_to_
     assert np.median(random_fits(range(20))) > 0.97
 
 
-def test_data_without_a_system_still_give_a_stable_model() -> None:
+def test_data_without_a_system_still_give_a_stable_model_and_a_warning(caplog: pytest.LogCaptureFixture) -> None:
     measured = history(known_model(), 1, 120)
     growing = measured.before + np.exp(0.05 * measured.s)[:, None] * np.random.default_rng(2).normal(size=(120, 6))
     model = identify([replace(measured, coefficients=growing)], max_order=3, substeps=1)
     assert np.max(model.poles.real) < 0.0
+    assert "do not trust it" in caplog.text
+
+
+def test_outputs_in_another_order_or_unit_give_the_same_model() -> None:
+    measured = history(known_model(), 1, 300, noise=0.01)
+    scaled = measured.coefficients * np.array([1.0, 1.0, 5.0, 1.0, 0.1, 1.0])
+    other = replace(measured, coefficients=scaled, before=measured.before * [1.0, 1.0, 5.0, 1.0, 0.1, 1.0])
+    one = identify([measured], order=5, substeps=1)
+    two = identify([other], outputs=("Cm", "CN"), order=5, substeps=1)
+    h, again = one.frequency_response([0.1, 0.7]), two.frequency_response([0.1, 0.7])
+    np.testing.assert_allclose(again[:, 1] / 5.0, h[:, 0], rtol=1e-4)
+    np.testing.assert_allclose(again[:, 0] * 10.0, h[:, 1], rtol=1e-4)
 
 
 def sampled_system(seed: int = 3) -> Sampled:

@@ -286,3 +286,12 @@ def test_shared_poles_serve_inputs_sampled_at_different_times() -> None:
     model = realise(data, "modal", poles="shared", tolerance=1e-4)
     assert model.order % 2 == 0
     assert max(error.peak for error in model.errors) < 5e-3
+
+
+@pytest.mark.parametrize("method", ["exponential", "era", "modal"])
+def test_outputs_in_another_order_or_unit_give_the_same_poles(method: str) -> None:
+    data = responses(plate(3.0)[0], plate()[1], np.linspace(0.0, 8.0, 101))
+    swapped = [replace(r, values=r.values[:, ::-1] * [0.1, 5.0]) for r in data.responses]
+    other = replace(data, responses=tuple(swapped), outputs=OUTPUTS[::-1])
+    poles = [realise(one, method, 3).poles for one in (data, other)]  # type: ignore[arg-type]
+    np.testing.assert_allclose(np.sort_complex(poles[1]), np.sort_complex(poles[0]), rtol=1e-4)

@@ -10,7 +10,9 @@ import pytest
 from indicial.conventions import Array
 from indicial.errors import InputError
 from indicial.history import History
+from indicial.motion import AlphaStep, PitchRateStep
 from indicial.rom import StateSpaceModel, refine_model
+from indicial.rom.identification import record_of
 from indicial.rom.modal_system import Parameters, load_slopes
 from indicial.rom.uncertainty import _as_model, _as_system, autocovariance
 from rom.cases import CONDITION, OUTPUTS, REFERENCE
@@ -70,8 +72,6 @@ def test_intervals_of_95_percent_hold_the_truth_about_as_often(memory: float) ->
 
 def test_slopes_of_the_loads_are_those_of_differences() -> None:
     system = _as_system(known_model())
-    from indicial.rom.identification import record_of
-
     record = record_of(known_model().predict(*noise_motion(1, 60), substeps=1), ("alpha", "q"), OUTPUTS, 1)
     scale = np.ones(2)
     slopes = load_slopes(system, record, scale, free_direct=True)
@@ -138,3 +138,15 @@ def test_autocovariance_is_that_of_the_process() -> None:
     found = autocovariance([coloured[:12000], coloured[12000:]])
     exact = 0.8 ** np.arange(15) / (1.0 - 0.64)
     np.testing.assert_allclose(found[:15], exact, atol=0.15)
+
+
+def test_uneven_steps_are_taken_as_white_only() -> None:
+    data = [two_states().unsteady(CONDITION, motion, np.geomspace(1.0, 1.2, 80) - 1.0) for motion in (
+        AlphaStep(CONDITION, 0.01), PitchRateStep(CONDITION, 20.0))]  # fmt: skip
+    steps = [noisy(one, seed, 0.0, 0.01) for seed, one in enumerate(data)]
+    with pytest.raises(InputError, match="uneven time step"):
+        refine_model(two_states(), steps)
+    found = refine_model(two_states(), steps, white=True)
+    record = found.derivatives().one("Cm_q")
+    assert record.uncertainty is not None
+    assert abs(record.value - two_states().derivatives().value("Cm_q")) < 4.0 * record.uncertainty

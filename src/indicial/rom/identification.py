@@ -9,6 +9,7 @@ The order is the one that predicts best what it has not seen: the last part of e
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -27,7 +28,11 @@ from indicial.rom.state_space import Candidate, ChannelError, StateSpaceModel
 
 METHOD = "okid + era"
 
+_LOG = logging.getLogger(__name__)
+
 _HELD_OUT = 0.3
+_POOR = 0.3
+"""Held-out error, relative to the loads, from which a warning is logged."""
 _ENOUGH = 1.05
 """Held-out error relative to the least, up to which fewer states are taken."""
 _RACE = 8
@@ -72,7 +77,8 @@ def identify(
     Returns
     -------
     StateSpaceModel
-        Stable whatever the data. Its `candidates` are for all inputs together.
+        Stable whatever the data. Its `candidates` are for all inputs together; where even the best predicts badly what
+        was held out, a warning is logged.
 
     Raises
     ------
@@ -96,6 +102,9 @@ def identify(
         best = _fewest(candidates)
         everything = [replace(record, weights=np.ones_like(record.weights)) for record in records]
         chosen = refine(systems[best], everything, scale, free_direct=direct is None)
+    if candidates[best].held_out > _POOR:
+        error = candidates[best].held_out
+        _LOG.warning("identified model: off by %.0f%% of the loads that were held out; do not trust it", 100.0 * error)
     return _model(chosen, histories, records, inputs, outputs, candidates, best)
 
 

@@ -167,7 +167,12 @@ class UncertainModel:
 
 
 def refine_model(
-    model: StateSpaceModel, histories: Sequence[History], *, known_direct: bool = False, substeps: int = 8
+    model: StateSpaceModel,
+    histories: Sequence[History],
+    *,
+    known_direct: bool = False,
+    white: bool = False,
+    substeps: int = 8,
 ) -> UncertainModel:
     """The model of the same number of states with least output error over histories, and its uncertainty.
 
@@ -176,9 +181,11 @@ def refine_model(
     model : StateSpaceModel
         Where to start from: one that was realised or identified.
     histories : sequence of History
-        At the model's condition, each with an even time step and from a steady state.
+        At the model's condition, each from a steady state and, unless `white`, with an even time step.
     known_direct : bool
         Keep D as it is.
+    white : bool
+        Take the residuals as independent of each other, which makes intervals too narrow where they are not.
     substeps : int
         Linear pieces in which the motion is followed between samples; 1 takes it linear.
 
@@ -192,8 +199,8 @@ def refine_model(
     for history in histories:
         if history.condition != model.condition or history.reference != model.reference:
             raise InputError("histories and model differ in flight condition or reference quantities")
-        if np.ptp(np.diff(history.s)) > 1e-6 * float(np.max(np.diff(history.s))):
-            raise InputError("a history has an uneven time step: lags of its residuals would mean nothing")
+        if not white and np.ptp(np.diff(history.s)) > 1e-6 * float(np.max(np.diff(history.s))):
+            raise InputError("a history has an uneven time step: its residuals can only be taken as white")
     records = [record_of(history, model.inputs, model.outputs, substeps) for history in histories]
     scale = np.sqrt(np.mean(np.concatenate([record.loads for record in records]) ** 2, axis=0))
     if not np.all(scale > 0.0):
@@ -201,11 +208,11 @@ def refine_model(
     system = refine(_as_system(model), records, scale, free_direct=not known_direct, evaluations=60)
     slopes = [load_slopes(system, record, scale, free_direct=not known_direct) for record in records]
     residuals = [(system.respond(record.inputs) - record.loads) / scale for record in records]
-    covariance, noise = _covariance(slopes, residuals)
+    covariance, noise = _covariance(slopes, residuals, white)
     return UncertainModel(_as_model(model, system), covariance, noise * scale, system, not known_direct)
 
 
-def _covariance(slopes: Sequence[Array], residuals: Sequence[Array]) -> tuple[Array, Array]:
+def _covariance(slopes: Sequence[Array], residuals: Sequence[Array], white: bool) -> tuple[Array, Array]:
     """Covariance of the parameters, and standard deviations of the residuals.
 
     Parameters
@@ -214,6 +221,8 @@ def _covariance(slopes: Sequence[Array], residuals: Sequence[Array]) -> tuple[Ar
         Changes of each record's loads with the parameters, shape (n, n_outputs, n_parameters).
     residuals : sequence of ndarray
         Shape (n, n_outputs).
+    white : bool
+        Whether lag 0 alone counts.
     """
     rows = np.concatenate([one.reshape(-1, one.shape[2]) for one in slopes])
     size = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
@@ -227,7 +236,8 @@ def _covariance(slopes: Sequence[Array], residuals: Sequence[Array]) -> tuple[Ar
     middle = np.zeros_like(inverse)
     noise = np.zeros(residuals[0].shape[1])
     for output in range(noise.size):
-        correlation = freedom * autocovariance([e[:, output] for e in residuals])
+        known = autocovariance([e[:, output] for e in residuals])
+        correlation = freedom * (known[:1] if white else known)
         noise[output] = np.sqrt(correlation[0])
         for lag, one in enumerate(correlation):
             products = sum(j[: max(len(j) - lag, 0), output].T @ j[lag:, output] for j in slopes)
