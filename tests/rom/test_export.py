@@ -21,6 +21,8 @@ from indicial.errors import InputError
 from indicial.motion import FlightCondition
 from indicial.rom import StateSpaceModel
 from indicial.rom.export import FORMATS, SUFFIXES, export, export_fmu, read_model
+from indicial.rom.export.c_source import casadi_functions
+from indicial.rom.export.portable import Portable
 from indicial.rom.signals import MotionInputs
 from indicial.rom.streaming import advance, stream
 from rom.cases import CONDITION
@@ -317,9 +319,16 @@ AIRCRAFT = """<?xml version="1.0"?>
     <emptywt unit="KG">4e3</emptywt><location name="CG" unit="M"><x>0.3</x><y>0</y><z>0</z></location>
   </mass_balance>
   <ground_reactions/><propulsion/>
-  <system file="wing_memory"/>
+  <system file="wing_memory"/><system file="lag"/>
   <aerodynamics file="wing"/>
 </fdm_config>
+"""
+
+
+LAG = """<?xml version="1.0"?>
+<system name="lag"><property value="0">try/input</property><channel name="lag">
+  <lag_filter name="try/lag"><input>try/input</input><c1>10</c1></lag_filter>
+</channel></system>
 """
 
 
@@ -336,6 +345,7 @@ def jsbsim_aircraft(model: StateSpaceModel, folder: Path) -> Any:
     program = jsbsim.FGFDMExec(str(folder))
     program.set_debug_level(0)
     program.set_dt(0.002)
+    (place / "Systems" / "lag.xml").write_text(LAG)
     assert program.load_model("slab")
     program["ic/h-sl-ft"], program["ic/mach"] = 30000.0, 2.0
     program["ic/alpha-deg"], program["ic/q-rad_sec"], program["ic/p-rad_sec"] = 2.0, 0.3, 0.4
@@ -386,3 +396,39 @@ def test_jsbsim_applies_the_loads_in_its_body_axes(tmp_path: Path) -> None:
     moments = [program[f"moments/{axis}-aero-lbsft"] for axis in "lmn"]
     lengths = np.array([1.3, 0.5, 1.3]) / 0.3048
     np.testing.assert_allclose(moments, pressure * 0.2 * loads[3:] * lengths, rtol=1e-10)
+
+
+def test_jsbsim_systems_see_the_frame_before(tmp_path: Path) -> None:
+    program = jsbsim_aircraft(any_model(), tmp_path)
+    for _ in range(5):
+        before = watch(program)[0]
+        program.run()
+        assert program["indicial/then-0"] == pytest.approx(before[0], rel=1e-14)
+        assert watch(program)[0][0] != before[0]
+
+
+@pytest.mark.parametrize("dt", [0.002, 0.001])
+def test_lag_filters_of_jsbsim_keep_the_time_step_of_loading(dt: float, tmp_path: Path) -> None:
+    """Why the export does not use them: after 0.2 s a lag of 10/s has done exp(-2) of its way if nothing is frozen."""
+    program = jsbsim_aircraft(any_model(0), tmp_path)
+    program.set_dt(dt)
+    program["try/input"] = 1.0
+    for _ in range(round(0.2 / dt)):
+        program.run()
+    left = 1.0 - program["try/lag"]
+    frozen = np.exp(-10.0 * 0.2 * 0.002 / dt)
+    assert left == pytest.approx(frozen, rel=0.02)
+
+
+def test_casadi_functions_are_the_model_too() -> None:
+    model, speed = any_model(), 300.0
+    t, motion = flight(50)
+    settle, step, loads = casadi_functions(Portable.of(model))
+    state, found = settle(motion[0], speed), [loads(settle(motion[0], speed), motion[0], speed)]
+    for k in range(1, t.size):
+        state = step(state, motion[k - 1], speed, motion[k], speed, t[k] - t[k - 1])
+        found.append(loads(state, motion[k], speed))
+    exact = predicted(model, t, motion, speed, motion[0])
+    np.testing.assert_allclose(
+        np.array([column.full()[:, 0] for column in found]), exact, atol=1e-12 * np.max(np.abs(exact))
+    )
