@@ -42,11 +42,13 @@ def _jump(results: Results) -> Claim:
 
 
 def peak(mach: Array, value: Array) -> float:
-    """Mach number of the largest value: of the parabola through it and its neighbours."""
-    top = int(np.clip(np.argmax(value), 1, len(value) - 2))
+    """Mach number of the largest value: of the parabola through it and its neighbours, if it has both."""
+    top = int(np.argmax(value))
+    if not 0 < top < len(value) - 1:
+        return float(mach[top])
     near = slice(top - 1, top + 2)
     curved, sloped, _ = np.polyfit(mach[near] - mach[top], value[near], 2)
-    return float(mach[top] - 0.5 * sloped / curved) if curved < 0.0 else float(mach[int(np.argmax(value))])
+    return float(mach[top] - 0.5 * sloped / curved)
 
 
 def _outlying(results: Results) -> list[Claim]:
