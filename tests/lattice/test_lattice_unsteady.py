@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from indicial.cfd.lattice import Lattice, LatticeSettings, LatticeSolver
+from indicial.cfd.lattice import Lattice, LatticeSettings, LatticeSolver, discrete
 from indicial.cfd.shapes import LiftingSurface, SpanStation
 from indicial.errors import InputError
 from indicial.methods import forced_oscillation, indicial_response, moving_frame, operator
@@ -166,6 +166,37 @@ def test_indicial_derivatives_are_those_of_the_linear_response() -> None:
     assert found == pytest.approx(
         response.at_zero("CN", "alpha")[1], abs=0.05 * abs(response.at_zero("CN", "alpha")[0])
     )
+
+
+@pytest.mark.parametrize("alpha", [0.0, 0.08])
+def test_state_space_is_the_march_with_a_frozen_wake(alpha: float) -> None:
+    solver = tailed("frozen", chordwise=2, spanwise=3)
+    condition = FlightCondition(0.3, alpha=alpha)
+    model = discrete(solver.linearise(condition), 0.3, 15.0, ("alpha", "q", "p"))
+    n = np.arange(40)
+    t = reduced(0.3 * n, solver, condition)
+    inputs = 1e-6 * np.stack([np.sin(0.3 * n), 1.0 - np.cos(0.2 * n), 0.1 * n], axis=1)
+    angles = condition.alpha + inputs[:, 0]
+    velocity = condition.speed * np.stack([np.cos(angles), 0.0 * angles, np.sin(angles)], axis=1)
+    rates = np.stack([inputs[:, 2], inputs[:, 1], 0.0 * angles], axis=1) / solver.reference.rate_scale(condition.speed)
+    history = solver.unsteady(condition, TabulatedMotion(t, velocity, rates), t)
+    found, wanted = model.respond(inputs), history.coefficients - history.before
+    # the march has first-order differences at its first step
+    assert np.allclose(found[3:], wanted[3:], atol=1e-4 * np.max(np.abs(wanted)))
+    assert model.system().dt == pytest.approx(0.3)
+
+
+def test_state_space_has_the_linear_response_s_limit() -> None:
+    solver = tailed("frozen", chordwise=2, spanwise=3)
+    response = solver.frequency_response(STILL, [0.05], ("alpha", "q"))
+    model = discrete(solver.linearise(STILL), 0.3, 40.0, ("alpha", "q"))
+    assert np.allclose(model.frequency_response([0.0])[0].real, response.static, atol=1e-9 * np.max(response.static))
+    slow = model.frequency_response([0.05])[0]
+    assert np.allclose(slow, response.values[0], atol=3e-3 * np.max(np.abs(slow)))
+    assert np.max(np.abs(np.linalg.eigvals(model.a))) < 1.0
+    lifting = tailed("shed").linearise(FlightCondition(0.3, alpha=0.1))
+    with pytest.raises(InputError, match="frozen"):
+        discrete(lifting, 0.3, 3.0)
 
 
 def test_operator_method_runs_on_the_lattice() -> None:

@@ -155,22 +155,22 @@ class LinearLattice:
         return cls(instant, circulation, baseline, loads, rings, wash, lift, condition, reference, shed)
 
     @property
-    def _half_chord(self) -> float:
+    def half_chord(self) -> float:
         """Distance per reduced time, c/2 [m]."""
         return 0.5 * self.reference.length
 
     def response(self, k: float, inputs: Sequence[str]) -> ComplexArray:
         """``H(ik)`` from inputs of alpha, beta, p, q, r to the six coefficients, shape (6, len(inputs))."""
-        lag = 1j * k / self._half_chord
+        lag = 1j * k / self.half_chord
         weights = _ring_means(lag, self.rings)
-        matrix = self._bound_wash.astype(complex)
+        matrix = self.bound_wash.astype(complex)
         trailing = self.instant.influence.lattice.trailing
         matrix[:, trailing] += np.einsum("rs,rps->ps", weights, self.wash)
-        wind = np.stack([self._wind(name, k) for name in inputs], axis=-1)
+        wind = np.stack([self.wind(name, k) for name in inputs], axis=-1)
         p = self.instant.influence.lattice.n_panels
         normalwash = np.einsum("pci,pc->pi", wind[:p], self.instant.influence.lattice.normal)
         circulation = np.linalg.solve(matrix, -normalwash)
-        rate = 1j * k * self.condition.speed / self._half_chord
+        rate = 1j * k * self.condition.speed / self.half_chord
         out: ComplexArray = (
             (self.loads.circulation + rate * self.loads.rate) @ circulation
             + np.einsum("rs,rks->ks", weights, self.lift) @ circulation[trailing]
@@ -179,7 +179,8 @@ class LinearLattice:
         return out
 
     @cached_property
-    def _bound_wash(self) -> Array:
+    def bound_wash(self) -> Array:
+        """Normalwash per circulation of the bound rings, shape (P, P) [1/m]."""
         influence = self.instant.influence
         return influence.normal(influence.bound[:, : influence.lattice.n_panels])
 
@@ -188,7 +189,7 @@ class LinearLattice:
         influence = self.instant.influence
         jump = self._disturbance(name).at(influence.places[: influence.lattice.n_panels])
         pushes = influence.impulse(jump)
-        return np.asarray(self.loads.whole_rate @ pushes * self.condition.speed / self._half_chord)
+        return np.asarray(self.loads.whole_rate @ pushes * self.condition.speed / self.half_chord)
 
     def _disturbance(self, name: str) -> RigidMotion:
         """Velocity and rate per unit of an input, mesh axes."""
@@ -201,11 +202,14 @@ class LinearLattice:
         rate = axis * 2.0 * speed / self.reference.moment_lengths
         return RigidMotion(nothing, mesh_from_body(rate), centre)
 
-    def _wind(self, name: str, k: float) -> ComplexArray:
-        """Change of the wind at all points per unit of an input, at fixed circulations, shape (n_points, 3)."""
+    def wind(self, name: str, k: float, *, displaced: bool = True) -> ComplexArray:
+        """Change of the wind at all points per unit of an input, at fixed circulations, shape (n_points, 3).
+
+        With `displaced`, that of a shed wake's new place is in it.
+        """
         disturbance = self._disturbance(name)
         wind = -disturbance.at(self.instant.influence.places).astype(complex)
-        if self.shed and np.any(self.circulation):
+        if displaced and self.shed and np.any(self.circulation):
             wind += self._displaced_wake(disturbance, k)
         return wind
 
@@ -242,7 +246,7 @@ class LinearLattice:
         itself turns with the wind at the trailing edge.
         """
         speed = self.condition.speed
-        lag = 1j * k / self._half_chord
+        lag = 1j * k / self.half_chord
         first, second = _integrals(lag, path)
         away = _away(self.instant.motion)
         constant = disturbance.at(start)

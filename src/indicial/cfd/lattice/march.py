@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import accumulate, pairwise
 
 import numpy as np
@@ -62,7 +63,11 @@ class March:
         self._columns = [slice(a, b) for a, b in pairwise(ends)]
         trailing = circulation[lattice.trailing]
         wakes = _wakes(influence, self._motion)
-        self.wakes = [wake.with_circulation(trailing[at]) for wake, at in zip(wakes, self._columns, strict=True)]
+        self.wakes = [
+            # the steady wake's lines count from the trailing edge, those of the march from where the wake begins
+            replace(wake, lines=departure(wake.lines, wake.tangent, sheet.last_chord)).with_circulation(trailing[at])
+            for wake, sheet, at in zip(wakes, lattice.sheets, self._columns, strict=True)
+        ]
         self._earlier: list[tuple[float, Array]] = []
         self._time = 0.0
 
