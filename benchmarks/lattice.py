@@ -1,0 +1,136 @@
+"""The unsteady vortex lattice beside Ptera Software's, and how its cost grows with panels and with steps.
+
+A rectangular wing of aspect ratio 6 at 5 degrees heaves at k = 0.314: the same panels, steps and prescribed wake in
+both, 100 steps to a period. Times are the marches alone, without compilation, on as many threads. Lift is compared over
+the last period. The plot goes to benchmarks/out/lattice.png. Ptera Software is looked for in PTERA_PYTHON.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from figures import Figure
+from numpy.typing import ArrayLike
+from peers import ptera
+
+from indicial.cfd.lattice import Lattice, LatticeSettings, LatticeSolver
+from indicial.cfd.shapes import LiftingSurface
+from indicial.conventions import Array
+from indicial.motion import FlightCondition, Motion
+
+CHORD, SPAN, ALPHA, PERIOD_CHORDS = 1.0, 6.0, math.radians(5.0), 10.0
+AMPLITUDE = 0.1
+STEPS_PER_PERIOD, PERIODS = 100, 3
+PANELS = ((4, 5), (6, 10), (10, 20), (14, 30))
+STEPS = (75, 150, 300, 600)
+PEER_STEPS = (75, 150, 300)
+CONDITION = FlightCondition(0.1, alpha=ALPHA)
+
+
+@dataclass(frozen=True)
+class Heave(Motion):
+    """Up and down along the body's axis, ``z = A sin(2 pi t/T)``."""
+
+    period: float
+
+    def velocity(self, time: ArrayLike) -> Array:
+        t = np.asarray(time, dtype=float)
+        up = AMPLITUDE * 2.0 * np.pi / self.period * np.cos(2.0 * np.pi * t / self.period)
+        return CONDITION.velocity - np.stack([0.0 * t, 0.0 * t, up], axis=-1)
+
+    def rate(self, time: ArrayLike) -> Array:
+        return np.zeros((*np.shape(time), 3))
+
+    def describe(self) -> dict[str, Any]:
+        return {"kind": "heave", "amplitude": AMPLITUDE, "period": self.period}
+
+
+def measure() -> list[Figure]:
+    """Time, compare, fit, draw."""
+    _march(4, 5, 5)
+    by_panels = [_march(m, n, 100)[0] for m, n in PANELS]
+    by_steps = [_march(10, 20, steps)[0] for steps in STEPS]
+    panels = np.array([2.0 * m * n for m, n in PANELS])
+    whole, lift = _march(10, 20, PERIODS * STEPS_PER_PERIOD)
+    figures = [
+        Figure.at_most("400 panels, 300 steps", whole, 10.0, "s"),
+        Figure("exponent of the number of panels, 100 steps", _exponent(panels[1:], by_panels[1:]), ""),
+        Figure("exponent of the number of steps, 400 panels", _exponent(STEPS, by_steps), ""),
+    ]
+    theirs: list[float] = []
+    if ptera.available():
+        runs = [ptera.run(_case(steps)) for steps in PEER_STEPS]
+        theirs = [run["seconds"] for run in runs]
+        last = slice(-STEPS_PER_PERIOD, None)
+        reference = np.array(runs[-1]["lift"])[last]
+        gap = np.max(np.abs(lift[last] - reference)) / np.max(np.abs(reference))
+        figures += [
+            Figure.at_least("times faster than Ptera Software, 300 steps", theirs[-1] / whole, 10.0),
+            Figure.at_most("lift against Ptera Software, last period, of its peak", float(gap), 0.02),
+            Figure("Ptera Software: 400 panels, 300 steps", theirs[-1], "s"),
+            Figure("Ptera Software: exponent of the number of steps", _exponent(PEER_STEPS, theirs), ""),
+        ]
+    else:
+        figures.append(Figure("Ptera Software not found: set PTERA_PYTHON", 0.0, "", "to be compared with", False))
+    _draw(panels, by_panels, by_steps, theirs)
+    return figures
+
+
+def _march(chordwise: int, spanwise: int, steps: int) -> tuple[float, Array]:
+    """Seconds, and lift over dynamic pressure and area of each step after the first instant."""
+    wing = LiftingSurface.wing("wing", SPAN, CHORD)
+    lattice = Lattice.of(wing, chordwise=chordwise, spanwise=spanwise, span_spacing="equal")
+    solver = LatticeSolver(lattice, wing.reference((0.25, 0.0, 0.0)), LatticeSettings(compressible=False))
+    period = PERIOD_CHORDS * CHORD / CONDITION.speed
+    times = period / STEPS_PER_PERIOD * np.arange(steps)
+    start = time.perf_counter()
+    history = solver.unsteady(CONDITION, Heave(period), times)
+    seconds = time.perf_counter() - start
+    return seconds, history["CN"] * math.cos(ALPHA) - history["CA"] * math.sin(ALPHA)
+
+
+def _case(steps: int) -> dict[str, Any]:
+    """The same for the peer."""
+    speed = CONDITION.speed
+    period = PERIOD_CHORDS * CHORD / speed
+    return {
+        "span": SPAN,
+        "chord": CHORD,
+        "chordwise": 10,
+        "spanwise": 20,
+        "amplitude": AMPLITUDE,
+        "period": period,
+        "speed": speed,
+        "alpha_deg": math.degrees(ALPHA),
+        "time_step": period / STEPS_PER_PERIOD,
+        "steps": steps,
+    }
+
+
+def _exponent(size: ArrayLike, seconds: ArrayLike) -> float:
+    return float(np.polyfit(np.log(np.asarray(size, dtype=float)), np.log(np.asarray(seconds)), 1)[0])
+
+
+def _draw(panels: Array, by_panels: list[float], by_steps: list[float], theirs: list[float]) -> None:
+    """Both growths."""
+    import matplotlib.pyplot as plt
+
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9.0, 3.6), layout="constrained")
+    left.loglog(panels, by_panels, "o-", label="this lattice, 100 steps")
+    right.loglog(STEPS, by_steps, "o-", label="this lattice, 400 panels")
+    if theirs:
+        right.loglog(PEER_STEPS, theirs, "s--", label="Ptera Software, 400 panels")
+    left.set(xlabel="panels", ylabel="seconds")
+    right.set(xlabel="steps", ylabel="seconds")
+    for axes in (left, right):
+        axes.legend()
+        axes.grid(True, which="both", alpha=0.3)
+    folder = Path(__file__).parent / "out"
+    folder.mkdir(exist_ok=True)
+    figure.savefig(folder / "lattice.png", dpi=150)
+    plt.close(figure)
