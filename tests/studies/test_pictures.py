@@ -162,7 +162,8 @@ def test_smaller_time_steps_change_forced_oscillations_less_than_half_a_percent(
 def test_the_longer_the_march_at_mach_1_the_nearer_the_operator():
     exact = derivative(KEPT.select(method="operator_without_steps").results[0], "Cm_q", k=0.025)
     short, longer = (
-        derivative(KEPT.select(method=name).results[0], "Cm_q") for name in ("time_step_0.05", "fom_pitch_rate_longer")
+        derivative(KEPT.select(method=name, level="quick").results[0], "Cm_q")
+        for name in ("time_step_0.05", "fom_pitch_rate_longer")
     )
     assert abs(longer - exact) < abs(short - exact)
     assert longer == pytest.approx(exact, rel=0.005)

@@ -163,5 +163,6 @@ _WITHOUT_START: tuple[tuple[str, dict[str, object], str, str], ...] = (
 
 def _time_steps(results: Results) -> tuple[list[float], dict[str, Array]]:
     """Time steps of which there are results, and the derivatives found with each."""
-    found = {step: result for step in STEPS_PER_PERIOD for result in results.select(method=f"time_step_{step:g}")}
+    quick = results.select(level="quick")
+    found = {step: result for step in STEPS_PER_PERIOD for result in quick.select(method=f"time_step_{step:g}")}
     return list(found), {name: np.array([derivative(r, name) for r in found.values()]) for name in ("Cm_q", "CN_q")}

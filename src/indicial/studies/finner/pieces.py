@@ -144,17 +144,19 @@ def _shown() -> list[Piece]:
     return listed
 
 
-def _time_steps(level: str) -> list[Piece]:
+def _time_step(level: str, step: float) -> Piece:
+    """A forced pitch rate at M 1 by steps of U dt/d."""
+    settings = {**FORCED, "steps_per_period": STEPS_PER_PERIOD[step], "motion": "pitch_rate"}
+    return _piece(f"time_step_{step:g}", "sting", level, SONIC, **settings)
+
+
+def _time_steps() -> list[Piece]:
     """One oscillation by ever smaller steps, by more periods, and what the operator says without steps and a start."""
-    operator = _piece("operator_without_steps", "sting", level, SONIC, k=[FORCED["k"]])
-    marches = [
-        _piece(
-            f"time_step_{step:g}", "sting", level, SONIC, **{**FORCED, "steps_per_period": count}, motion="pitch_rate"
-        )
-        for step, count in STEPS_PER_PERIOD.items()
-    ]
-    longer = _piece("fom_pitch_rate_longer", "sting", level, SONIC, **{**FORCED, "periods": 6}, motion="pitch_rate")
-    return [operator, *marches, longer]
+    operator = _piece("operator_without_steps", "sting", "quick", SONIC, k=[FORCED["k"]])
+    longer = _piece("fom_pitch_rate_longer", "sting", "quick", SONIC, **{**FORCED, "periods": 6}, motion="pitch_rate")
+    quick = [_time_step("quick", step) for step in STEPS_PER_PERIOD]
+    coarse = [_time_step("coarse", step) for step in (max(STEPS_PER_PERIOD), min(STEPS_PER_PERIOD))]
+    return [operator, *quick, *coarse, longer]
 
 
 PIECES: tuple[Piece, ...] = (
@@ -165,6 +167,6 @@ PIECES: tuple[Piece, ...] = (
     *(piece for level in MARCHED for piece in _marches(level)),
     *_halved_step(),
     *_shown(),
-    *_time_steps("quick"),
+    *_time_steps(),
 )
 """All of them."""
