@@ -12,6 +12,9 @@ _DERIVATIVES, _FACE_WORK = 25 + 25 + 5 + 40 + 14, 5 + 10
 and sensitivities."""
 
 _BLOCK, _STATE, _GRADIENT = 25, 5, 15
+_WIDE_ROW = 25
+"""Blocks a row of the wide preconditioner in a mesh of hexahedra."""
+
 _REAL, _COMPLEX = 8, 16
 
 
@@ -38,7 +41,7 @@ def operator_bytes(grid: Grid, entries: int, *, restart: int, kept: int = 24) ->
 def steady_bytes(grid: Grid, *, restart: int = 40) -> int:
     """Most bytes that a steady state or a march on `grid` takes at a time."""
     faces, cells = len(grid.owner), grid.n_cells
-    entries = cells + int((grid.cells >= 0).sum())
+    entries = cells * _WIDE_ROW
     real = faces * (_DERIVATIVES + _FACE_WORK) + cells * (3 * _BLOCK + 2 * _GRADIENT + (restart + 8) * _STATE)
     return _REAL * real + entries * _BLOCK * (_REAL + _REAL // 2)
 

@@ -19,6 +19,8 @@ from indicial.cfd.flow.residual import MeshMotion, Residual, gather
 from indicial.cfd.march.continuation import Standing, continuation
 from indicial.cfd.march.convergence import ConvergenceHistory, Recorder
 from indicial.cfd.march.ilu import BlockILU, Pattern
+from indicial.cfd.march.krylov import Operator
+from indicial.cfd.march.preconditioner import TwoLevel
 from indicial.conventions import Array
 
 Progress = Callable[[float], None]
@@ -28,6 +30,9 @@ _START_CFL = 20.0
 _NEARBY_CFL = 1e4
 _FIRST_ORDER_TOLERANCE = 1e-3
 _LARGEST_CHANGE = 0.4
+
+_HARD = 30
+"""Products of one step's linear solution beyond which its preconditioner no longer serves."""
 
 
 @dataclass(frozen=True)
@@ -129,45 +134,81 @@ def converge(
     return SteadyState(q, motion, record.history(round_off(residual) / scale))
 
 
-@dataclass(frozen=True)
 class _SteadyEquations:
     """``R(q; V_b, omega) = 0`` for the `continuation`."""
 
-    residual: Residual
-    pattern: Pattern
-    motion: MeshMotion
     name: ClassVar[str] = "steady"
     advice: ClassVar[str] = "a finer or smoother mesh, or a start from a nearby condition"
 
+    def __init__(self, residual: Residual, pattern: Pattern, motion: MeshMotion) -> None:
+        self.residual = residual
+        self._motion = motion
+        self._preconditioners = _Preconditioners(residual, pattern)
+
     def __call__(self, q: Array) -> Array:
-        return self.residual(q, self.motion)
+        return self.residual(q, self._motion)
 
     def round_off(self) -> float:
         return round_off(self.residual)
 
     def linearise(self, q: Array, cfl: float) -> _SteadyJacobian:
         grid = self.residual.grid
-        dt = cfl * local_time_step(grid, q, self.motion)
+        dt = cfl * local_time_step(grid, q, self._motion)
         mass = (grid.volume / dt)[:, None, None] * conservative_jacobian(q)
-        return _SteadyJacobian(Jacobian(self.residual, q, self.motion), mass, self.pattern)
+        return self._preconditioners.attach(_SteadyJacobian(Jacobian(self.residual, q, self._motion), mass))
 
     def update(self, q: Array, dq: Array) -> Array:
         return limited_update(q, dq)
 
 
 class _SteadyJacobian:
-    """``V/dtau dW/dq + J`` and its incomplete factorisation."""
+    """``V/dtau dW/dq + J`` and its approximate inverse."""
 
-    def __init__(self, jacobian: Jacobian, mass: Array, pattern: Pattern) -> None:
-        self._jacobian, self._mass = jacobian, mass
-        blocks = jacobian.compact_blocks(mass, pattern.slots, pattern.diagonal, len(pattern.indices))
-        self.precondition = BlockILU(pattern, blocks).solve
+    precondition: Operator
+
+    def __init__(self, jacobian: Jacobian, mass: Array) -> None:
+        self.jacobian, self.mass = jacobian, mass
         self.products = 0
 
     def apply(self, x: Array) -> Array:
         self.products += 1
-        y: Array = self._jacobian.apply(x) + np.einsum("nij,nj->ni", self._mass, x)
+        y: Array = self.jacobian.apply(x) + np.einsum("nij,nj->ni", self.mass, x)
         return y
+
+
+class _Preconditioners:
+    """The approximate inverse of each step: compact factors while they serve, then wide ones for as long as those do.
+
+    Compact factors are cheap to make and are made for every step. On fine meshes they leave too much to GMRES; wide
+    ones cost as much as many products, so they stay until a step shows that the flow has moved away from them.
+    """
+
+    def __init__(self, residual: Residual, compact: Pattern) -> None:
+        self._residual, self._compact = residual, compact
+        self._wide: Pattern | None = None
+        self._kept: TwoLevel | None = None
+        self._last: _SteadyJacobian | None = None
+
+    def attach(self, linear: _SteadyJacobian) -> _SteadyJacobian:
+        """Give the matrix its approximate inverse.
+
+        Raises
+        ------
+        DivergenceError
+            If that is singular.
+        """
+        hard = self._last is not None and self._last.products > _HARD and self._residual.second_order
+        self._last = linear
+        if hard:
+            self._wide = self._wide or Pattern.wide(self._residual.grid)
+            self._kept = None  # its memory goes before the next is made
+            self._kept = TwoLevel(linear.jacobian, self._wide, linear.mass)
+        linear.precondition = self._compact_factors(linear) if self._kept is None else self._kept.solve
+        return linear
+
+    def _compact_factors(self, linear: _SteadyJacobian) -> Operator:
+        p = self._compact
+        return BlockILU(p, linear.jacobian.compact_blocks(linear.mass, p.slots, p.diagonal, len(p.indices))).solve
 
 
 def limited_update(q: Array, dq: Array) -> Array:
