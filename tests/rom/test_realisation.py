@@ -11,7 +11,8 @@ from indicial.errors import InputError
 from indicial.motion import PitchOscillation
 from indicial.rom import StepResponse, StepResponses, check_prediction, deficiency_integral, realise
 from indicial.rom.era import era_modes, hankel
-from indicial.rom.modes import Modes, TimeTarget, fit_amplitudes, refine
+from indicial.rom.mode_fitting import TimeTarget, fit_amplitudes, refine
+from indicial.rom.modes import Modes
 from rom.cases import COLUMNS, CONDITION, OUTPUTS, REFERENCE, ROWS, graded, known_system, plate, responses
 from theory.linear import NoisySolver, incompressible_airfoil, theodorsen
 

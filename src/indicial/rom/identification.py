@@ -94,9 +94,7 @@ def identify(
     for j, name in enumerate(inputs):
         if max(np.ptp(record.inputs.values[:, j]) for record in records) == 0.0:
             raise InputError(f"no history moves {name}")
-    scale = np.sqrt(np.mean(np.concatenate([record.loads for record in records]) ** 2, axis=0))
-    if not np.all(scale > 0.0):
-        raise InputError(f"{outputs[int(np.argmin(scale))]} does not change in the histories")
+    scale = load_sizes(records, outputs)
     with threadpool_limits(limits=1, user_api="blas"):
         systems, candidates = _tried(records, scale, step, order, max_order, direct)
         best = _fewest(candidates)
@@ -133,6 +131,20 @@ def record_of(history: History, inputs: tuple[str, ...], outputs: tuple[str, ...
     return Record(from_rest, (history.coefficients - history.before)[:, columns], np.ones(history.s.size))
 
 
+def load_sizes(records: Sequence[Record], outputs: tuple[str, ...]) -> Array:
+    """Root mean square of each load over the records, shape (n_outputs,).
+
+    Raises
+    ------
+    InputError
+        If one does not change.
+    """
+    sizes: Array = np.sqrt(np.mean(np.concatenate([record.loads for record in records]) ** 2, axis=0))
+    if not np.all(sizes > 0.0):
+        raise InputError(f"{outputs[int(np.argmin(sizes))]} does not change in the histories")
+    return sizes
+
+
 def _training(record: Record) -> Record:
     """The same record with the last part held out."""
     weights = record.weights.copy()
@@ -158,8 +170,6 @@ def _tried(
         errors = [candidate.held_out for candidate in candidates]
         if len(errors) > 4 and min(errors[-3:]) > 0.98 * min(errors[:-3]):
             break
-    if not systems:
-        raise InputError("no decaying mode could be found in the histories")
     return systems, candidates
 
 

@@ -1,7 +1,7 @@
 r"""State-space models from step responses or frequency responses.
 
-Each input gets modes of its own, shared by all outputs (`modes`), or one set of poles serves all inputs. However the
-poles are found, the model keeps
+Each input gets modes of its own, shared by all outputs (`mode_fitting`), or one set of poles serves all inputs. However
+the poles are found, the model keeps
 
 - the value at 0+ as direct feedthrough D (the piston jump),
 - the final value as static gain, and
@@ -34,7 +34,8 @@ from indicial.conventions import COEFFICIENTS, Array
 from indicial.errors import InputError
 from indicial.frequency import FrequencyResponse, without_limit
 from indicial.rom.era import era_modes
-from indicial.rom.modes import Modes, Target, clipped, fit_amplitudes, joint_error, refine
+from indicial.rom.mode_fitting import Target, clipped, fit_amplitudes, joint_error, refine
+from indicial.rom.modes import Modes
 from indicial.rom.response import StepResponses
 from indicial.rom.signals import INPUTS, check_names, quadrature_weights
 from indicial.rom.sources import FrequencySource, Part, Source, StepSource

@@ -15,8 +15,8 @@ from indicial.errors import InputError, NoLimitError
 from indicial.frequency import FrequencyResponse
 from indicial.rom.deficiency import deficiency_integral
 from indicial.rom.era import settling_time
+from indicial.rom.mode_fitting import FrequencyTarget, Target, TimeTarget
 from indicial.rom.model import ComplexArray
-from indicial.rom.modes import FrequencyTarget, Target, TimeTarget
 from indicial.rom.response import StepResponse
 from indicial.rom.signals import quadrature_weights
 

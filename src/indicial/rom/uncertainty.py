@@ -27,7 +27,7 @@ from indicial.derivatives import DerivativeTable
 from indicial.errors import InputError
 from indicial.history import History
 from indicial.motion import Motion
-from indicial.rom.identification import record_of
+from indicial.rom.identification import load_sizes, record_of
 from indicial.rom.modal import ModalForm
 from indicial.rom.modal_system import ModalSystem, Parameters, load_slopes, refine
 from indicial.rom.modes import Modes
@@ -202,9 +202,7 @@ def refine_model(
         if not white and np.ptp(np.diff(history.s)) > 1e-6 * float(np.max(np.diff(history.s))):
             raise InputError("a history has an uneven time step: its residuals can only be taken as white")
     records = [record_of(history, model.inputs, model.outputs, substeps) for history in histories]
-    scale = np.sqrt(np.mean(np.concatenate([record.loads for record in records]) ** 2, axis=0))
-    if not np.all(scale > 0.0):
-        raise InputError(f"{model.outputs[int(np.argmin(scale))]} does not change in the histories")
+    scale = load_sizes(records, model.outputs)
     system = refine(_as_system(model), records, scale, free_direct=not known_direct, evaluations=60)
     slopes = [load_slopes(system, record, scale, free_direct=not known_direct) for record in records]
     residuals = [(system.respond(record.inputs) - record.loads) / scale for record in records]
