@@ -102,11 +102,13 @@ def respond_modal(
     for first in range(0, count, _BLOCK):
         size = min(_BLOCK, count - first)
         known = min(size + 1, count - first)  # the next block's first sample ends this one's last step
+        # slices, for an index that counts from 0 is known to be none from the end, and the loop becomes a vector's
+        given, found = values[first : first + known], loads[first : first + size]
         for m in range(inputs):
             for t in range(known):
-                u[m, t] = values[first + t, m]
+                u[m, t] = given[t, m]
             u[m, known : size + 1] = u[m, known - 1]
-        step = _common_step(s, first, known, roundoff)
+        step = _common_step(s[first : first + known], roundoff)
         if step > 0.0 and abs(step - held_step) > roundoff:
             held_step = step
             _hold_block(poles, step, b, c, d, grown, after, gain_re, gain_im, direct)
@@ -124,7 +126,7 @@ def respond_modal(
             _add(c_re, c_im, i, i < real, path, size, y)
         for t in range(size):
             for j in range(outputs):
-                loads[first + t, j] = y[j, t]
+                found[t, j] = y[j, t]
     return loads
 
 
@@ -165,14 +167,16 @@ def _driven(b: ComplexArray, mode: int, u: Array, t: int) -> complex:
 
 
 @numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _common_step(s: Array, first: int, known: int, roundoff: float) -> float:
-    """The step of a block, 0 if its steps differ."""
-    if known < 2:
+def _common_step(s: Array, roundoff: float) -> float:
+    """The step between samples, 0 if steps differ."""
+    steps = s.size - 1
+    if steps < 1:
         return 0.0
-    mean = (s[first + known - 1] - s[first]) / (known - 1)
+    mean = (s[steps] - s[0]) / steps
     different = 0
-    for t in range(first, first + known - 1):
-        different += abs(s[t + 1] - s[t] - mean) > roundoff
+    for t in range(steps):
+        if abs(s[t + 1] - s[t] - mean) > roundoff:
+            different += 1
     return 0.0 if different else float(mean)
 
 
@@ -208,12 +212,20 @@ def _march_even(real: bool, x: complex, grown: complex, size: int, path: Array) 
     a, b = x.real, x.imag
     if real:
         square = p * p
-        for t in range(0, size - 1, 2):  # two samples at a time: the recurrence is bound by its latency
-            forced, then = path[0, t], path[0, t + 1]
-            path[0, t], path[0, t + 1] = a, p * a + forced
-            a = square * a + (p * forced + then)
-        if size % 2:
-            a, path[0, size - 1] = p * a + path[0, size - 1], a
+        cube, fourth = square * p, square * square
+        last = size - size % 4
+        for t in range(0, last, 4):  # four samples at a time: the recurrence is bound by its latency
+            w0, w1, w2, w3 = path[0, t], path[0, t + 1], path[0, t + 2], path[0, t + 3]
+            x2 = p * w0 + w1
+            x3 = square * w0 + (p * w1 + w2)
+            x4 = (cube * w0 + square * w1) + (p * w2 + w3)
+            path[0, t] = a
+            path[0, t + 1] = p * a + w0
+            path[0, t + 2] = square * a + x2
+            path[0, t + 3] = cube * a + x3
+            a = fourth * a + x4
+        for t in range(last, size):
+            a, path[0, t] = p * a + path[0, t], a
         return complex(a, b)
     for t in range(size):
         forced, turned = path[0, t], path[1, t]
