@@ -1,8 +1,9 @@
 """The unsteady vortex lattice beside Ptera Software's, and how its cost grows with panels and with steps.
 
 A rectangular wing of aspect ratio 6 at 5 degrees heaves at k = 0.314: the same panels, steps and prescribed wake in
-both, 100 steps to a period. Times are processor times of all threads, of the marches alone, without compilation. Lift is
-compared over the last period. The plot goes to benchmarks/out/lattice.png. Ptera Software is looked for in PTERA_PYTHON.
+both, 100 steps to a period. Times are processor times of all threads, of the marches alone, without compilation.
+Lift is compared over the last period. The plot goes to benchmarks/out/lattice.png. Ptera Software is looked for in
+PTERA_PYTHON.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ def available() -> bool:
 
 
 def run(case: dict[str, Any]) -> dict[str, Any]:
-    """Solve a heaving wing: ``seconds`` of processor time of the march without compilation, ``lift`` at every step, ``version``.
+    """Solve a heaving wing: ``seconds`` of processor time without compilation, ``lift`` at every step, ``version``.
 
     Raises
     ------

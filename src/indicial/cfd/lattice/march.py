@@ -16,6 +16,9 @@ from indicial.conventions import Array
 WAKE_SPANS = 30.0
 """Length over which the helical wake of a steady rotation is followed, in the lattice's largest dimension."""
 
+_THINNED_EVERY = 64
+"""Number of lines at whose multiples a wake is thinned out."""
+
 
 def steady_instant(influence: Influence, motion: RigidMotion, wake_motion: RigidMotion | None = None) -> Instant:
     """The steady flow of a constant motion; the wake may follow another one (a frozen wake)."""
@@ -106,7 +109,8 @@ class March:
             away = np.where(moving, wind / np.where(moving, speed[:, None], 1.0), wake.far)
             line = departure(edge, away, sheet.last_chord)
             carried = wake.carried(matrix, shift, step * np.linalg.norm(mean.at(edge), axis=1))
-            wakes.append(carried.after(line, np.zeros(sheet.columns), away))
+            fresh = carried.after(line, np.zeros(sheet.columns), away)
+            wakes.append(fresh.thinned() if len(fresh.lines) % _THINNED_EVERY == 0 else fresh)
         self.wakes = wakes
 
     def accept(self, circulation: Array) -> None:

@@ -19,6 +19,9 @@ WakeModel = Literal["shed", "frozen"]
 the body does: the wake of linear theory."""
 
 
+CLOSEST = 0.02
+"""Distance between the lines that are kept of an old wake, over how far they have come."""
+
 _TURN_STEP = 0.05
 _GROWTH = 1.15
 
@@ -93,6 +96,16 @@ class WakeSheet:
             np.concatenate([tangent[None], self.tangent]),
             self.far,
         )
+
+    def thinned(self) -> WakeSheet:
+        """Without lines that stand closer than `CLOSEST` of their distance; the newest two and the last one stay."""
+        path = np.mean(self.path, axis=1)
+        kept = [0, 1]
+        for n in range(2, len(path) - 1):
+            if path[n] - path[kept[-1]] >= CLOSEST * path[n]:
+                kept.append(n)
+        kept.append(len(path) - 1)
+        return WakeSheet(self.lines[kept], self.path[kept], self.circulation[kept], self.tangent[kept], self.far)
 
     def with_circulation(self, circulation: Array) -> WakeSheet:
         """All of the same circulation (columns,), as in steady flow."""
