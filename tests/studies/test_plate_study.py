@@ -47,8 +47,9 @@ def test_closed_forms_of_the_derivatives_are_the_limits_of_the_exact_frequency_r
 
 def test_motions_not_seen_begin_in_the_steady_state_that_models_assume():
     data, unseen = plate_data(2.0, PLATE)
-    assert list(unseen) == ["k = 0.05", "k = 0.2", "k = 0.5", "multisine"]
-    np.testing.assert_allclose(unseen["multisine"].before, data.baseline, atol=1e-12)
+    assert list(unseen) == ["k = 0.05", "k = 0.2", "k = 0.5", "k = 2", "multisine", "pulse"]
+    for name in ("multisine", "pulse"):
+        np.testing.assert_allclose(unseen[name].before, data.baseline, atol=1e-12)
 
 
 def test_finner_model_made_again_from_the_kept_flow_predicts_the_kept_marches():

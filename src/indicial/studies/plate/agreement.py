@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from indicial.derivatives import DerivativeTable
@@ -10,7 +12,7 @@ from indicial.studies.kept import Results
 from indicial.studies.piece import PieceResult
 from indicial.studies.plate.computing import RECOMMENDED, SMALL, plate_solver
 from indicial.studies.plate.exact import incidence_derivatives, steady_response
-from indicial.studies.plate.pieces import MACHS, PLATE
+from indicial.studies.plate.pieces import BEYOND, MACHS, PLATE
 
 PLATE_ERROR, FINNER_ERROR, FINNER_STATES = 0.02, 0.01, 6.0
 
@@ -18,7 +20,13 @@ PLATE_ERROR, FINNER_ERROR, FINNER_STATES = 0.02, 0.01, 6.0
 def claims(results: Results) -> tuple[Claim, ...]:
     """Every asked figure, and what is reported beside them."""
     plates, finner = results.select(mesh="plate"), results.select(mesh="finner")
-    return (*_plate(plates), _steps(plates), _derivatives(plates), *_finner(finner.results[0] if len(finner) else None))
+    return (
+        *_plate(plates),
+        _beyond(plates),
+        _steps(plates),
+        _derivatives(plates),
+        *_finner(finner.results[0] if len(finner) else None),
+    )
 
 
 def methods(results: Results) -> tuple[str, ...]:
@@ -35,7 +43,7 @@ def _plate(plates: Results) -> list[Claim]:
         if not made:
             listed.append(Claim(name, None, PLATE_ERROR))
             continue
-        errors = {(m, label): e for m, row in made.items() for label, e in row["unseen"].items()}
+        errors = {(m, label): e for m, row in made.items() for label, e in asked(row).items()}
         mach, label = max(errors, key=lambda place: errors[place])
         states = "/".join(str(row["order"]) for _, row in sorted(made.items()))
         listed.append(
@@ -49,6 +57,24 @@ def _plate(plates: Results) -> list[Claim]:
             )
         )
     return listed
+
+
+def asked(row: dict[str, Any]) -> dict[str, float]:
+    """Errors of a realisation on the motions of which something is asked."""
+    return {label: error for label, error in row["unseen"].items() if label != BEYOND}
+
+
+def _beyond(plates: Results) -> Claim:
+    name = f"plate, every realisation: error at {BEYOND}"
+    errors = {
+        (r.piece.mach, method): row["unseen"][BEYOND]
+        for r in plates
+        for method, row in r.provenance["realisations"].items()
+    }
+    if not errors:
+        return Claim(name, None, None)
+    mach, method = max(errors, key=lambda place: errors[place])
+    return Claim(name, errors[mach, method], None, f"worst at M {mach:g}, {method}")
 
 
 def _steps(plates: Results) -> Claim:

@@ -15,7 +15,7 @@ from indicial.errors import InputError
 from indicial.frequency import FrequencyResponse
 from indicial.history import History
 from indicial.methods import forced_oscillation, indicial_response, operator
-from indicial.motion import AlphaStep, FlightCondition, Multisine, PitchOscillation, PitchRateStep
+from indicial.motion import AlphaStep, FlightCondition, Multisine, PitchOscillation, PitchRateStep, TabulatedMotion
 from indicial.rom import (
     Comparison,
     PredictionCheck,
@@ -111,7 +111,18 @@ def plate_data(mach: float, settings: Mapping[str, Any]) -> tuple[StepResponses,
         motion = PitchOscillation.from_reduced_frequency(condition, solver.reference, 0.01, float(k))
         unseen[f"k = {k:g}"] = solver.unsteady(condition, motion, np.linspace(0.0, 2.0 * motion.period, 200))
     unseen["multisine"] = _multisine(solver, condition, settings["multisine"])
+    unseen["pulse"] = _pulse(solver, condition, settings["pulse"], 2.0 * settled)
     return data, unseen
+
+
+def _pulse(solver: Solver, condition: FlightCondition, settings: Mapping[str, Any], end: float) -> History:
+    """A triangle in alpha, and rest until `end`."""
+    width, count = float(settings["width"]), int(settings["samples"])
+    s = np.concatenate([np.linspace(0.0, width, 2 * count + 1), np.linspace(width, end, 200)[1:]])
+    alpha = condition.alpha + float(settings["alpha"]) * np.maximum(1.0 - np.abs(2.0 * s / width - 1.0), 0.0)
+    velocity = condition.speed * np.stack([np.cos(alpha), np.zeros(s.size), np.sin(alpha)], axis=1)
+    times = _times(s, condition, solver)
+    return solver.unsteady(condition, TabulatedMotion(times, velocity, np.zeros((s.size, 3))), times)
 
 
 def _multisine(solver: Solver, condition: FlightCondition, settings: Mapping[str, Any]) -> History:

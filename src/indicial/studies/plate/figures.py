@@ -11,7 +11,7 @@ from indicial.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY,
 from indicial.rom import check_prediction
 from indicial.studies.kept import Results
 from indicial.studies.piece import PieceResult
-from indicial.studies.plate.agreement import PLATE_ERROR, methods
+from indicial.studies.plate.agreement import PLATE_ERROR, asked, methods
 from indicial.studies.plate.computing import finner_files, finner_model
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def _errors(plates: Results, plt: Any) -> Figure:
     figure, axes = plt.subplots(figsize=(7.5, 4.4))
     for i, method in enumerate(methods(plates)):
         rows = [(r.piece.mach, r.provenance["realisations"].get(method)) for r in plates]
-        points = np.array([(mach, max(row["unseen"].values())) for mach, row in sorted(rows, key=_mach) if row])
+        points = np.array([(mach, max(asked(row).values())) for mach, row in sorted(rows, key=_mach) if row])
         axes.semilogy(points[:, 0], points[:, 1], f"{_MARKS[i % 8]}-", color=_COLOURS[i % 8], label=method)
     axes.axhline(PLATE_ERROR, color=GREY, ls="--", label="asked")
     axes.set_xlabel("Mach number")

@@ -9,10 +9,14 @@ from indicial.studies.piece import Piece
 
 MACHS = (1.2, 1.5, 2.0, 3.0)
 
+BEYOND = "k = 2"
+"""An oscillation faster than any of a rigid flight: shown, but nothing is asked there."""
+
 PLATE: dict[str, Any] = {
     "arm": 3.0,  # chords from the moment reference point aft to mid-chord, as of a tail or a fin
     "samples": 161,  # of the step responses, up to twice the time at which they settle
-    "k": [0.05, 0.2, 0.5],  # of the oscillations not seen
+    "k": [0.05, 0.2, 0.5, 2.0],  # of the oscillations not seen
+    "pulse": {"alpha": 0.01, "width": 0.4, "samples": 20},  # up and down in alpha, fast beside the response
     "multisine": {"lowest": 0.05, "lines": 12, "alpha": 0.004, "q": 0.002, "step": 0.15},
 }
 
