@@ -20,7 +20,7 @@ from indicial.conventions import COEFFICIENTS, Array, ReferenceQuantities
 from indicial.errors import InputError
 from indicial.motion import FlightCondition
 from indicial.rom import StateSpaceModel
-from indicial.rom.export import FORMATS, SUFFIXES, export, export_fmu, read_model
+from indicial.rom.export import FORMATS, SUFFIXES, export, export_fmu, export_jsbsim, read_model
 from indicial.rom.export.c_source import casadi_functions
 from indicial.rom.export.portable import Portable
 from indicial.rom.signals import MotionInputs
@@ -332,13 +332,13 @@ LAG = """<?xml version="1.0"?>
 """
 
 
-def jsbsim_aircraft(model: StateSpaceModel, folder: Path) -> Any:
+def jsbsim_aircraft(model: StateSpaceModel, folder: Path, static: Any = None) -> Any:
     """A heavy body with the exported model, ready to fly at M 2, pitching and rolling."""
     jsbsim = pytest.importorskip("jsbsim")
     place = folder / "aircraft" / "slab"
     (place / "Systems").mkdir(parents=True)
     (place / "slab.xml").write_text(AIRCRAFT)
-    aerodynamics, memory = export(model, "jsbsim", place / "wing.xml")
+    aerodynamics, memory = export_jsbsim(model, place / "wing.xml", static=static)
     memory.rename(place / "Systems" / memory.name)
     assert aerodynamics.exists()
     jsbsim.FGJSBBase().debug_lvl = 0
@@ -396,6 +396,37 @@ def test_jsbsim_applies_the_loads_in_its_body_axes(tmp_path: Path) -> None:
     moments = [program[f"moments/{axis}-aero-lbsft"] for axis in "lmn"]
     lengths = np.array([1.3, 0.5, 1.3]) / 0.3048
     np.testing.assert_allclose(moments, pressure * 0.2 * loads[3:] * lengths, rtol=1e-10)
+
+
+def test_static_curves_are_tables_in_jsbsim_about_which_the_memory_is_linear(tmp_path: Path) -> None:
+    model = any_model()
+    alpha = np.linspace(-0.2, 0.2, 9)
+    curves = {"Cm": (alpha, 0.1 - alpha + 20.0 * alpha**3), "CA": (alpha, 0.3 + alpha**2)}
+    program = jsbsim_aircraft(model, tmp_path, curves)
+    u, speed, dt, _ = watch(program)
+    flow, loads, row = stream(model, u), np.empty(4), model.outputs.index("Cm")
+    first = u
+    for _ in range(100):
+        program.run()
+        previous = speed
+        u, speed, dt, found = watch(program)
+        advance(flow, u, 2.0 * previous * dt / 0.5, loads)
+        linear = model.baseline[4] + model.static_gain[row, 0] * u[0]
+        at = u[0] + CONDITION.alpha
+        assert found[4] == pytest.approx(loads[row] - linear + np.interp(at, *curves["Cm"]), abs=1e-10)
+        assert found[0] == pytest.approx(np.interp(at, *curves["CA"]), abs=1e-12)
+        assert found[2] == pytest.approx(loads[0], abs=1e-10)
+    assert abs(u[0] - first[0]) > 1e-3
+
+
+def test_static_curves_that_are_none_are_refused(tmp_path: Path) -> None:
+    for static, reason in (
+        ({"CL": ([0.0, 1.0], [0.0, 1.0])}, "no static curve of 'CL'"),
+        ({"CN": ([0.0, 0.0], [0.0, 1.0])}, "increasing alpha"),
+        ({"CN": ([0.0, 1.0], [0.0, np.nan])}, "finite value"),
+    ):
+        with pytest.raises(InputError, match=reason):
+            export_jsbsim(any_model(), tmp_path / "wing.xml", static=static)
 
 
 def test_jsbsim_systems_see_the_frame_before(tmp_path: Path) -> None:

@@ -9,10 +9,15 @@ speed, nothing is frozen at loading, as the coefficients of JSBSim's own ``lag_f
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from xml.sax.saxutils import escape
 
-from indicial.conventions import COEFFICIENTS
+import numpy as np
+from numpy.typing import ArrayLike
+
+from indicial.conventions import COEFFICIENTS, Array
+from indicial.errors import InputError
 from indicial.files import write_text
 from indicial.rom.export.portable import MEANING, Portable
 from indicial.rom.state_space import StateSpaceModel
@@ -35,25 +40,56 @@ _Complex = tuple[str, str]
 """Real and imaginary part."""
 
 
-def export_jsbsim(model: StateSpaceModel, path: Path) -> tuple[Path, ...]:
+StaticCurves = Mapping[str, tuple[ArrayLike, ArrayLike]]
+"""Coefficient, and its settled values over alpha [rad]: (alpha, values), at beta and rates of the model's condition."""
+
+
+def export_jsbsim(model: StateSpaceModel, path: Path, *, static: StaticCurves | None = None) -> tuple[Path, ...]:
     """``NAME.xml``, for ``<aerodynamics file="NAME"/>``, and ``NAME_memory.xml``, for ``<system file="NAME_memory"/>``.
 
     Properties: ``indicial/CA`` to ``indicial/Cn``, the coefficients. The states are at rest under the motion of the
     moment whenever JSBSim runs without time going on (initial conditions, trim).
 
+    Parameters
+    ----------
+    static : mapping, optional
+        Curves, written as tables, in the place of ``C_0 + H_alpha(0) (alpha - alpha_0)`` of the coefficients named: a
+        static curve that bends, with the linear memory about it. Linear between its points, constant beyond.
+
     Raises
     ------
     InputError
-        If the model has no modal form.
+        If the model has no modal form, or a curve is none of its own.
     """
-    portable = Portable.of(model)
+    portable, curves = Portable.of(model), _checked(model, static or {})
     beside = path.with_name(f"{path.stem}_memory.xml")
-    write_text(path, _aerodynamics(portable, beside.stem))
+    write_text(path, _aerodynamics(portable, beside.stem, curves))
     write_text(beside, _system(portable, beside.stem))
     return path, beside
 
 
-def _aerodynamics(portable: Portable, memory: str) -> str:
+def _checked(model: StateSpaceModel, static: StaticCurves) -> dict[str, Array]:
+    """The curves as arrays of shape (n, 2)."""
+    curves = {}
+    for name, (alpha, values) in static.items():
+        if name not in COEFFICIENTS or "alpha" not in model.inputs:
+            raise InputError(
+                f"no static curve of {name!r} over alpha: the model has {', '.join(model.inputs)} as inputs"
+            )
+        x, y = np.asarray(alpha, dtype=float), np.asarray(values, dtype=float)
+        if (
+            x.ndim != 1
+            or x.size < 2
+            or x.shape != y.shape
+            or not np.all(np.diff(x) > 0.0)
+            or not np.all(np.isfinite(y))
+        ):
+            raise InputError(f"the static curve of {name} needs two or more increasing alpha, a finite value for each")
+        curves[name] = np.stack([x, y], axis=1)
+    return curves
+
+
+def _aerodynamics(portable: Portable, memory: str, curves: dict[str, Array]) -> str:
     reference = portable.model.reference
     area, lengths = reference.area / FOOT**2, (1.0, 1.0, 1.0, *(reference.moment_lengths / FOOT))
     modes = portable.modes
@@ -65,8 +101,12 @@ def _aerodynamics(portable: Portable, memory: str) -> str:
         if i >= modes.real:
             lines += _define("function", f"x-{i}-im", _sum(_p(f"xi-{i}-im"), held[1]))
     for j, name in enumerate(COEFFICIENTS):
-        terms = [_v(portable.model.baseline[j])]
-        terms += [_product(_v(gain), _p(f"now-{m}")) for m, gain in enumerate(modes.d[j]) if gain]
+        direct, terms = modes.d[j].copy(), [_v(portable.model.baseline[j])]
+        if name in curves:
+            m = portable.model.inputs.index("alpha")
+            direct[m] = np.real(np.sum(modes.c[j] * modes.b[:, m] / modes.poles))  # D - H(0)
+            terms = [_table(_MOTION["alpha"], curves[name])]
+        terms += [_product(_v(gain), _p(f"now-{m}")) for m, gain in enumerate(direct) if gain]
         for i, weight in enumerate(modes.c[j]):
             if weight:
                 terms.append(_product(_v(weight.real), _p(f"x-{i}-re")))
@@ -200,6 +240,11 @@ def _times(a: tuple[str, ...], b: tuple[str, ...], real: bool) -> _Complex:
         _difference(_product(a[0], b[0]), _product(a[1], b[1])),
         _sum(_product(a[0], b[1]), _product(a[1], b[0])),
     )
+
+
+def _table(variable: str, curve: Array) -> str:
+    rows = " ".join(f"\n{x!r} {y!r}" for x, y in curve.tolist())
+    return f'<table><independentVar lookup="row">{variable}</independentVar><tableData>{rows}\n</tableData></table>'
 
 
 def _define(kind: str, name: str, value: str, description: str = "") -> list[str]:
