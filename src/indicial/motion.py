@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -214,10 +214,7 @@ class PitchOscillation(Motion):
     rotates: bool = True
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.omega) and self.omega > 0.0):
-            raise InputError(f"oscillation frequency is {self.omega} rad/s, must be positive and finite")
-        if not (math.isfinite(self.amplitude) and self.amplitude != 0.0):
-            raise InputError(f"oscillation amplitude is {self.amplitude} rad, must be finite and not zero")
+        _check_sine(self.amplitude, self.omega)
         if not (self.varies_alpha or self.rotates):
             raise InputError("an oscillation must vary alpha, rotate, or both")
 
@@ -262,6 +259,106 @@ class PitchOscillation(Motion):
             "amplitude": self.amplitude,
             "omega": self.omega,
         }
+
+
+Compensation = Literal["full", "sideslip", "none"]
+"""What a rolling body's reference point does besides: see `RollOscillation`."""
+
+
+@dataclass(frozen=True)
+class RollOscillation(Motion):
+    r"""Roll ``phi = A sin(omega t)`` about the body's x axis, ``p = A omega cos(omega t)``, from zero sideslip.
+
+    A body at incidence that only rolls turns alpha into sideslip: of the velocity V_z across it at zero roll it keeps
+    ``V_z cos phi`` as w and gets ``V_z sin phi`` as v. A translation in step with the roll compensates for that:
+
+    - "full": V_b stays as it is, hence alpha and beta do (a translation by ``V_z sin phi``, ``V_z (1 - cos phi)``);
+    - "sideslip": v = 0, hence beta = 0 to round-off, and ``w = V_z cos phi`` (by ``V_z sin phi cos phi``,
+      ``V_z sin^2 phi``, as a dynamic mesh usually has it);
+    - "none": roll alone.
+
+    The translations are components of the reference point's velocity along y and z of the axes at zero roll.
+
+    Parameters
+    ----------
+    condition : FlightCondition
+        The mean state, without sideslip.
+    amplitude : float
+        A [rad].
+    omega : float
+        Angular frequency [rad/s], positive. `from_reduced_frequency` takes k instead.
+    compensation : {"full", "sideslip", "none"}
+
+    Raises
+    ------
+    InputError
+        If the condition has sideslip, or a number or the compensation is bad.
+    """
+
+    condition: FlightCondition
+    amplitude: float
+    omega: float
+    compensation: Compensation = "full"
+
+    def __post_init__(self) -> None:
+        _check_sine(self.amplitude, self.omega)
+        if self.compensation not in get_args(Compensation):
+            raise InputError(f"no compensation {self.compensation!r}; there are {', '.join(get_args(Compensation))}")
+        if self.condition.beta != 0.0:
+            raise InputError(f"a roll oscillation starts without sideslip, beta is {self.condition.beta} rad")
+
+    @classmethod
+    def from_reduced_frequency(
+        cls,
+        condition: FlightCondition,
+        reference: ReferenceQuantities,
+        amplitude: float,
+        k: float,
+        compensation: Compensation = "full",
+    ) -> RollOscillation:
+        """The oscillation at ``k = omega b/2U`` with the length b of roll moments."""
+        omega = angular_frequency(k, condition.speed, float(reference.moment_lengths[0]))
+        return cls(condition, amplitude, omega, compensation)
+
+    @property
+    def period(self) -> float:
+        """[s]"""
+        return 2.0 * math.pi / self.omega
+
+    def angle(self, time: ArrayLike) -> Array:
+        """Roll angle phi [rad]."""
+        return self.amplitude * np.sin(self.omega * np.asarray(time, dtype=float))
+
+    def velocity(self, time: ArrayLike) -> Array:
+        phi = self.angle(time)
+        u, _, w = self.condition.velocity
+        across = {
+            "full": (np.zeros_like(phi), np.full_like(phi, w)),
+            "sideslip": (np.zeros_like(phi), w * np.cos(phi)),
+            "none": (w * np.sin(phi), w * np.cos(phi)),
+        }[self.compensation]
+        return np.stack([np.full_like(phi, u), *across], axis=-1)
+
+    def rate(self, time: ArrayLike) -> Array:
+        t = np.asarray(time, dtype=float)
+        omega = np.zeros((*t.shape, 3))
+        omega[..., 0] = self.amplitude * self.omega * np.cos(self.omega * t)
+        return omega
+
+    def describe(self) -> dict[str, Any]:
+        return {
+            "kind": "roll_oscillation",
+            "amplitude": self.amplitude,
+            "omega": self.omega,
+            "compensation": self.compensation,
+        }
+
+
+def _check_sine(amplitude: float, omega: float) -> None:
+    if not (math.isfinite(omega) and omega > 0.0):
+        raise InputError(f"oscillation frequency is {omega} rad/s, must be positive and finite")
+    if not (math.isfinite(amplitude) and amplitude != 0.0):
+        raise InputError(f"oscillation amplitude is {amplitude} rad, must be finite and not zero")
 
 
 @dataclass(frozen=True)

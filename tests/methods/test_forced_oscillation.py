@@ -177,4 +177,4 @@ def test_reductions_refuse_what_is_no_oscillation_or_too_short() -> None:
     with pytest.raises(InputError, match="even number"):
         forced_oscillation.run(system, CONDITION, A, K, steps_per_period=9)
     with pytest.raises(InputError, match="no oscillation"):
-        forced_oscillation.experiment(CONDITION, REFERENCE, A, K, "roll")
+        forced_oscillation.experiment(CONDITION, REFERENCE, A, K, "yaw")

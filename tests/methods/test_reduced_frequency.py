@@ -166,7 +166,7 @@ def test_other_nonsense_is_refused_at_once() -> None:
         with pytest.raises(InputError, match="harmonics"):
             reduced_frequency.run(UntouchedSolver(), CONDITION, A, K, harmonics=harmonics)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="no oscillation"):
-        reduced_frequency.run(UntouchedSolver(), CONDITION, A, K, "roll")  # type: ignore[arg-type]
+        reduced_frequency.run(UntouchedSolver(), CONDITION, A, K, "yaw")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="can only march"):
         reduced_frequency.run(random_system(REFERENCE), CONDITION, A, K)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="no coefficient"):

@@ -1,4 +1,4 @@
-r"""Forced oscillation in pitch, plunge or pitch rate, and its three reductions (Eqs. 6, 9, 12).
+r"""Forced oscillation in pitch, plunge, pitch rate or roll, and its three reductions (Eqs. 6, 9, 12).
 
 Also called FOM. After the start has died out a load repeats itself as
 ``C - mean = A (in_phase sin wt + k out_of_phase cos wt)`` plus higher harmonics (Eq. 2), with the motion
@@ -10,10 +10,14 @@ motion         in phase                    out of phase
 pitch          ``C_ja - k^2 C_jqd`` (3)    ``C_jad + C_jq`` (4)
 plunge         ``C_ja`` + O(k^2)           ``C_jad``
 pitch_rate     ``-k^2 C_jqd``              ``C_jq``
+roll           ``-k^2 C_jpd``              ``C_jp``
 =============  ==========================  =======================
 
 All values are those at k: on a linear flow with transfer functions H_a, H_q the out-of-phase part in pitch is exactly
 ``Im(H_a(ik) + ik H_q(ik))/k``, and equals the derivatives of the other methods only as k goes to 0.
+
+In roll the angle is phi, and k and the reduced rate have the length of roll moments (``k = w b/2U``, ``p b/2U``). That
+holds for "full" compensation (`indicial.motion.RollOscillation`): the others vary alpha or beta too.
 """
 
 from __future__ import annotations
@@ -29,24 +33,28 @@ from indicial.conventions import COEFFICIENTS, Array, ReferenceQuantities, reduc
 from indicial.derivatives import Derivative, DerivativeTable
 from indicial.errors import InputError
 from indicial.history import History
-from indicial.motion import FlightCondition, PitchOscillation
+from indicial.motion import Compensation, FlightCondition, PitchOscillation, RollOscillation
 from indicial.solver import Solver
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-OscillationMotion = Literal["pitch", "plunge", "pitch_rate"]
+OscillationMotion = Literal["pitch", "plunge", "pitch_rate", "roll"]
 Reduction = Literal["phase_angle", "regression", "fourier"]
 
 KINDS: dict[str, OscillationMotion] = {
     "pitch_oscillation": "pitch",
     "plunge_oscillation": "plunge",
     "pitch_rate_oscillation": "pitch_rate",
+    "roll_oscillation": "roll",
 }
 """From the kind that a history names to the motion."""
 
 DERIVATIVES = ("CN", "Cm")
 """Loads whose derivatives are tabled."""
+
+ROLL_DERIVATIVES = ("CY", "Cl", "Cn")
+"""Those of roll."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +64,7 @@ class OscillationReading:
     Parameters
     ----------
     reduction : {"phase_angle", "regression", "fourier"}
-    motion : {"pitch", "plunge", "pitch_rate"}
+    motion : {"pitch", "plunge", "pitch_rate", "roll"}
     k, amplitude : float
         Reduced frequency and amplitude [rad].
     periods : int
@@ -87,6 +95,11 @@ class OscillationReading:
     condition: FlightCondition
     reference: ReferenceQuantities
 
+    @property
+    def loads(self) -> tuple[str, ...]:
+        """Names of the loads whose derivatives are tabled."""
+        return ROLL_DERIVATIVES if self.motion == "roll" else DERIVATIVES
+
     def value(self, name: str, part: Literal["in_phase", "out_of_phase"] = "out_of_phase") -> float:
         """One part of one load."""
         if name not in COEFFICIENTS:
@@ -103,14 +116,15 @@ class OscillationReading:
     def derivatives(self, source: str = "forced oscillation") -> DerivativeTable:
         """The records that the motion gives, method ``fom``, with this reduction and k."""
         records = []
-        for name in DERIVATIVES:
+        for name in self.loads:
             out = {
                 "pitch": f"{name}_q+{name}_alphadot",
                 "plunge": f"{name}_alphadot",
                 "pitch_rate": f"{name}_q",
+                "roll": f"{name}_p",
             }[self.motion]
             wanted = [(out, self.value(name), self.uncertainty(name))]
-            if self.motion != "pitch_rate":
+            if self.motion in ("pitch", "plunge"):
                 wanted.insert(0, (f"{name}_alpha", self.value(name, "in_phase"), None))
             records += [
                 Derivative.at(
@@ -136,7 +150,7 @@ class OscillationReading:
             f"{math.degrees(self.amplitude):.3g} deg, by {self.reduction} over {self.periods} periods"
         )
         rows = [head]
-        for name in DERIVATIVES:
+        for name in self.loads:
             spread = self.uncertainty(name)
             within = "" if spread is None else f" +- {spread:.2g}"
             rows.append(
@@ -151,18 +165,22 @@ def experiment(
     amplitude: float,
     k: float,
     motion: OscillationMotion = "pitch",
-) -> PitchOscillation:
-    """The oscillation at amplitude [rad] and reduced frequency k (Eq. 5)."""
+    *,
+    compensation: Compensation = "full",
+) -> PitchOscillation | RollOscillation:
+    """The oscillation at amplitude [rad] and reduced frequency k (Eq. 5); `compensation` is for roll."""
     if motion not in KINDS.values():
         raise InputError(f"no oscillation {motion!r}; there are {', '.join(KINDS.values())}")
     if not (np.isfinite(k) and k > 0.0):
         raise InputError(f"reduced frequency k is {k}, must be positive and finite")
+    if motion == "roll":
+        return RollOscillation.from_reduced_frequency(condition, reference, amplitude, k, compensation)
     return PitchOscillation.from_reduced_frequency(
         condition, reference, amplitude, k, varies_alpha=motion != "pitch_rate", rotates=motion != "plunge"
     )
 
 
-def sample_times(oscillation: PitchOscillation, periods: int, steps_per_period: int) -> Array:
+def sample_times(oscillation: PitchOscillation | RollOscillation, periods: int, steps_per_period: int) -> Array:
     """Uniform instants [s] over whole periods, from 0, shape (periods * steps_per_period + 1,)."""
     if periods < 1 or steps_per_period < 8 or steps_per_period % 2:
         raise InputError(
@@ -180,9 +198,10 @@ def run(
     *,
     periods: int = 3,
     steps_per_period: int = 100,
+    compensation: Compensation = "full",
 ) -> History:
     """Force the oscillation and record it; read it with `phase_angle`, `regression` or `fourier`."""
-    oscillation = experiment(condition, solver.reference, amplitude, k, motion)
+    oscillation = experiment(condition, solver.reference, amplitude, k, motion, compensation=compensation)
     return solver.unsteady(condition, oscillation, sample_times(oscillation, periods, steps_per_period))
 
 
@@ -250,15 +269,18 @@ def _reading(reduction: Reduction, history: History, periods: int | None) -> Osc
     reduce = {"phase_angle": _opposite_phases, "regression": _least_squares, "fourier": _integrals}[reduction]
     sine, cosine, error = reduce(record, record.whole, count)
     speed, reference = history.condition.speed, history.reference
-    unit = record.amplitude * record.omega * float(reference.rate_scale(speed)[1])
+    motion = KINDS[history.motion["kind"]]
+    axis = 0 if motion == "roll" else 1
+    length = float(reference.moment_lengths[0]) if motion == "roll" else reference.length
+    unit = record.amplitude * record.omega * float(reference.rate_scale(speed)[axis])
     drift = periodicity = None
     if record.whole >= 2:
         drift = (reduce(record, record.whole, 1)[1] - reduce(record, record.whole - 1, 1)[1]) / unit
         periodicity = _periodicity(record)
     return OscillationReading(
         reduction=reduction,
-        motion=KINDS[history.motion["kind"]],
-        k=reduced_frequency(record.omega, speed, reference.length),
+        motion=motion,
+        k=reduced_frequency(record.omega, speed, length),
         amplitude=record.amplitude,
         periods=count,
         in_phase=sine / record.amplitude,

@@ -24,7 +24,7 @@ from indicial.errors import InputError
 from indicial.history import History
 from indicial.methods import forced_oscillation
 from indicial.methods.forced_oscillation import KINDS, OscillationMotion, OscillationReading
-from indicial.motion import FlightCondition, PitchOscillation
+from indicial.motion import FlightCondition, PitchOscillation, RollOscillation
 from indicial.solver import PeriodicSolver, instants
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ class PeriodicLoads:
         return len(self.sine)
 
     @property
-    def oscillation(self) -> PitchOscillation:
+    def oscillation(self) -> PitchOscillation | RollOscillation:
         """The motion that was forced."""
         return forced_oscillation.experiment(self.condition, self.reference, self.amplitude, self.k, self.motion)
 
@@ -187,6 +187,8 @@ def run(
         If the flow does not converge.
     """
     instants(harmonics)
+    if motion == "roll":
+        raise InputError("periodic flows are of oscillations in pitch; march one in roll, by forced_oscillation")
     if not isinstance(solver, PeriodicSolver):
         raise InputError(f"{type(solver).__name__} has no `periodic`: it can only march, by forced_oscillation")
     oscillation = forced_oscillation.experiment(condition, solver.reference, amplitude, k, motion)
@@ -202,8 +204,8 @@ def read(history: History) -> PeriodicLoads:
         If the history is no such period of an oscillation.
     """
     kind = history.motion.get("kind")
-    if kind not in KINDS:
-        raise InputError(f"a history of {kind!r} is no oscillation; those are {', '.join(KINDS)}")
+    if kind not in KINDS or KINDS[kind] == "roll":
+        raise InputError(f"a history of {kind!r} is no oscillation in pitch, plunge or pitch rate")
     omega = float(history.motion["omega"])
     harmonics = (history.time.size - 1) // 2
     phase = instants(harmonics)
