@@ -286,7 +286,7 @@ def _assemble(
 def _before(samples: _Samples, entry: HistoryMap, earlier: NDArray[np.bool_], step: bool) -> Array:
     """Loads of the steady state before the motion: given, or of the last row before it."""
     if entry.before is not None:
-        given: dict[str, float] = {**entry.before}
+        given = {str(name): value for name, value in entry.before.items()}
         missing = [name for name in samples.outputs if name not in given]
         if missing:
             raise InputError(f"before: {', '.join(missing)} missing; the file tells {', '.join(samples.outputs)}")
