@@ -31,7 +31,7 @@ OF_UNKNOWN_SIZE = ("thickness_0.04", "thickness_0.088", "chord_0.95")
 INCIDENCES = dict.fromkeys((1.077, 1.16, 1.254), (1.0, 2.0)) | dict.fromkeys(OUTLYING, (3.0, 5.0))
 """Angles of attack [deg] about which the flow is linearised, by Mach number; free flights yaw by 1 to 6 degrees."""
 
-AMPLITUDES = {1.077: (2.0,), 1.16: (0.5, 1.0, 2.0), 1.254: (2.0,), 4.3: (4.5,)}
+AMPLITUDES = {1.077: (2.0,), 1.16: (0.5, 1.0, 2.0), 1.254: (2.0,), 2.718: (2.0,), 4.3: (4.5,)}
 """Amplitudes of pitch oscillations [deg]: up to what the flights' mean squared yaw is of a plane motion."""
 
 SLOW = (0.0024, 0.004)
