@@ -9,6 +9,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -36,9 +37,14 @@ def run(case: dict[str, Any]) -> dict[str, Any]:
     """
     # PYTHONPATH and the like are ours, not its
     own = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
-    done = subprocess.run(
-        [interpreter(), str(CASE), json.dumps(case)], capture_output=True, text=True, check=False, env=own
-    )
+    with tempfile.TemporaryDirectory() as cache:
+        done = subprocess.run(
+            [interpreter(), str(CASE), json.dumps(case)],
+            capture_output=True,
+            text=True,
+            check=False,
+            env=own | {"NUMBA_CACHE_DIR": cache},
+        )
     if done.returncode:
         raise RuntimeError(f"Ptera Software failed: {done.stderr.strip()[-500:]}")
     result: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])

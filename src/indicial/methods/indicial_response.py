@@ -9,7 +9,7 @@ The integral is taken by `indicial.rom.deficiency`, which refuses it where it ha
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -49,6 +49,9 @@ class StepResponse:
         C(inf) per unit step by load, from a steady solution after the step; a load without one has it estimated.
     condition : FlightCondition
     reference : ReferenceQuantities
+    impulse : dict
+        ``integral of C ds`` over the instant of the jump itself per unit step, by load: the added mass of an
+        incompressible flow, which no sample can show (`History.provenance`). None in a compressible one.
     """
 
     kind: StepKind
@@ -58,6 +61,7 @@ class StepResponse:
     final: dict[str, float]
     condition: FlightCondition
     reference: ReferenceQuantities
+    impulse: dict[str, float] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Array:
         """Response of one load, shape (n,)."""
@@ -86,7 +90,8 @@ class StepResponse:
     def integral(self, name: str, *, noise: float = 1e-4) -> DeficiencyIntegral:
         """``integral_0^inf F ds`` with its error bar; see `deficiency_integral`, also for what it refuses."""
         label = f"{name} after a step in {self.kind}"
-        return deficiency_integral(self.s, self[name], self.final.get(name), noise=noise, name=label)
+        found = deficiency_integral(self.s, self[name], self.final.get(name), noise=noise, name=label)
+        return replace(found, value=found.value - self.impulse.get(name, 0.0))
 
     def plot(self, names: tuple[str, ...] = LOADS, ax: Axes | None = None) -> Axes:
         """Responses per unit step against reduced time."""
@@ -254,6 +259,7 @@ def read(history: History, final: SteadyLoads | Mapping[str, float] | None = Non
         final={name: float(value) for name, value in (final or {}).items() if _index(name) >= 0},
         condition=history.condition,
         reference=history.reference,
+        impulse={name: float(value) / amplitude for name, value in history.provenance.get("impulse", {}).items()},
     )
 
 

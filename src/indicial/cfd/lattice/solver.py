@@ -17,7 +17,7 @@ from indicial.cfd.lattice.linear_response import frequency_response
 from indicial.cfd.lattice.march import March, steady_instant
 from indicial.cfd.lattice.panels import Lattice
 from indicial.cfd.lattice.wake import RigidMotion, WakeModel
-from indicial.conventions import Array, ReferenceQuantities, mesh_from_body
+from indicial.conventions import COEFFICIENTS, Array, ReferenceQuantities, mesh_from_body
 from indicial.errors import InputError
 from indicial.frequency import INPUTS, FrequencyResponse, check_inputs, reduced_frequencies
 from indicial.history import History
@@ -118,9 +118,9 @@ class LatticeSolver:
         r"""Loads at `times` [s], which are the steps of the march too.
 
         A jump of the motion at t = 0 gives an incompressible flow an impulse (its added mass), which no instant's loads
-        can show. It is returned as a compressible flow spreads it, over a short while: the loads at t = 0+ have it as a
-        triangle that is gone at ``times[1]``, so that integrals of the history over time are right. All else at t = 0+
-        is the limit from later times. The time in which the wing goes the length of a panel is not resolved.
+        can show. It is left out of them and kept in ``provenance["impulse"]``: ``integral of C ds`` over the jump, by
+        load. The loads at t = 0+ are those just after it, with the rate of change of the first step. The time in which
+        the wing goes the length of two panels is not resolved.
         """
         t = np.asarray(times, dtype=float)
         if t.ndim != 1 or t.size < 1 or t[0] != 0.0 or np.any(np.diff(t) <= 0.0) or not np.all(np.isfinite(t)):
@@ -142,7 +142,8 @@ class LatticeSolver:
         if t.size > 1:
             (first, after_jump), (_, later) = kept
             loads[0] = self.coefficients(first.loads(after_jump, (later - after_jump) / t[1]), condition)
-            loads[0] += self.coefficients(_impulse(first, start), condition) * 2.0 / t[1]
+        per_time = 2.0 * condition.speed / self._reference.length
+        impulse = self.coefficients(_impulse(kept[0][0], start), condition) * per_time
         return History(
             time=t,
             coefficients=loads,
@@ -152,7 +153,7 @@ class LatticeSolver:
             condition=condition,
             reference=self._reference,
             motion=motion.describe(),
-            provenance=self._provenance(),
+            provenance=self._provenance() | {"impulse": dict(zip(COEFFICIENTS, impulse.tolist(), strict=True))},
         )
 
     def linearise(self, condition: FlightCondition) -> LinearLattice:
