@@ -59,7 +59,7 @@ AMPLITUDES = {"pitch_deg": 0.05, "alpha_step_deg": 0.02, "q_step": 2e-4}
 FORCED = {"k": 0.025, "amplitude_deg": AMPLITUDES["pitch_deg"], "periods": 2, "steps_per_period": 120}
 STEP = {"alpha_deg": AMPLITUDES["alpha_step_deg"], "q": AMPLITUDES["q_step"], "first": 0.02, "growth": 1.08}
 
-SLOWEST = {"sting": {"end": 240.0, "largest": 1.0}, "base": {"end": 80.0, "largest": 1.0}}
+SLOWEST = {"sting": {"end": 120.0, "largest": 1.0}, "base": {"end": 80.0, "largest": 1.0}}
 """Reduced time of a step's record, and its largest interval: a supersonic response is over when the slowest wave has
 left the body; near M 1 that takes far longer."""
 
