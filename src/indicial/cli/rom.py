@@ -29,6 +29,8 @@ rom = typer.Typer(
         "responses, checked against the forced oscillations it has not seen."
     ),
     epilog="**Examples:** `indicial rom runs/basic_finner_quick`, "
+    "`indicial rom build alpha_step.out q_step.out --map map.toml`, "
+    "`indicial rom check model.json flight.csv --map map.toml`, "
     "`indicial rom export model.json --to fmu -o model.fmu`",
     rich_markup_mode="markdown",
 )

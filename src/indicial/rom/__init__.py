@@ -1,6 +1,7 @@
 """Reduced-order models: step responses in, loads under any motion out; each model is a `Solver`."""
 
 from indicial.rom.balancing import Truncation, truncate
+from indicial.rom.building import BuiltModel, build_model
 from indicial.rom.check import CheckedCoefficient, PredictionCheck, check_prediction
 from indicial.rom.comparison import Compared, Comparison, compare
 from indicial.rom.convolution import ConvolutionModel
@@ -16,6 +17,7 @@ from indicial.rom.streaming import Stream, advance, stream
 from indicial.rom.uncertainty import PredictedBand, UncertainModel, refine_model
 
 __all__ = [
+    "BuiltModel",
     "Candidate",
     "ChannelError",
     "CheckedCoefficient",
@@ -38,6 +40,7 @@ __all__ = [
     "Truncation",
     "UncertainModel",
     "advance",
+    "build_model",
     "check_prediction",
     "compare",
     "deficiency",
