@@ -1,7 +1,7 @@
 """A heaving rectangular wing by Ptera Software: run by `peers.ptera` in the Python that has it.
 
-Its vortex cores, which grow with age in the march and which its own steady solver does not have, are made very thin: its
-march then ends in its steady solution, and both programs solve the same problem.
+Its vortex cores, which grow with age in the march and which its own steady solver does not have, are made very thin:
+its march then ends in its steady solution, and both programs solve the same problem.
 """
 
 from __future__ import annotations

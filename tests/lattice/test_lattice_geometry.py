@@ -3,9 +3,10 @@ import math
 import numpy as np
 import pytest
 
-from indicial.cfd.lattice import Lattice
+from indicial.cfd.lattice import Lattice, LatticeSolver
 from indicial.cfd.shapes import Airfoil, LiftingSurface, SpanStation, WingSection
 from indicial.errors import InputError
+from indicial.motion import FlightCondition, TabulatedMotion
 
 
 def test_five_digit_mean_line_has_its_design_camber() -> None:
@@ -86,3 +87,27 @@ def test_lofted_mean_surface_has_the_camber_and_twist_asked_for() -> None:
     along = local[:, 0] * math.cos(0.1) - local[:, 2] * math.sin(0.1)
     across = local[:, 0] * math.sin(0.1) + local[:, 2] * math.cos(0.1)
     assert np.allclose(across / 1.5, Airfoil.naca("2412").camber_line(along / 1.5 + 0.25)[0], atol=1e-5)
+
+
+def test_surfaces_that_cross_or_cover_one_another_are_refused() -> None:
+    wing = LiftingSurface.wing("wing", 6.0, 1.0)
+    for top in (0.5, 0.7):
+        ends = (SpanStation(0.2, 1.1, -0.5, 0.5), SpanStation(0.2, 1.3, top, 0.5))
+        with pytest.raises(InputError, match="cross one another"):
+            Lattice.of([wing, LiftingSurface("leaning", ends, symmetric=False)])
+    with pytest.raises(InputError, match="lie on one another"):
+        Lattice.of([wing, LiftingSurface.wing("twin", 6.0, 1.0)])
+    # a fin that ends on the middle of a tailplane, and one beside it
+    fin = LiftingSurface("fin", (SpanStation(0.0, 0.0, 0.0, 1.0), SpanStation(0.3, 0.0, 1.0, 0.7)), symmetric=False)
+    assert Lattice.of([wing, fin]).n_panels > 0
+
+
+def test_wing_that_starts_from_rest_has_no_load_before() -> None:
+    wing = LiftingSurface.wing("wing", 4.0, 1.0)
+    solver = LatticeSolver(Lattice.of(wing, chordwise=2, spanwise=4), wing.reference((0.25, 0.0, 0.0)))
+    condition = FlightCondition(0.1, alpha=0.1)
+    t = np.array([0.0, 0.01, 0.02])
+    motion = TabulatedMotion(t, np.outer(t / 0.02, condition.velocity), np.zeros((3, 3)))
+    history = solver.unsteady(condition, motion, t)
+    assert np.array_equal(history.before, np.zeros(6))
+    assert history["CN"][-1] > 0.0

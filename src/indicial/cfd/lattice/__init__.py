@@ -3,7 +3,8 @@
 from indicial.cfd.lattice.instant import Instant, StripLoads
 from indicial.cfd.lattice.linear import LinearLattice
 from indicial.cfd.lattice.march import March, steady_instant
-from indicial.cfd.lattice.panels import Lattice, Strips
+from indicial.cfd.lattice.panels import Lattice
+from indicial.cfd.lattice.sheets import Strips
 from indicial.cfd.lattice.solver import LatticeSettings, LatticeSolver
 from indicial.cfd.lattice.state_space import DiscreteLattice, discrete
 from indicial.cfd.lattice.wake import RigidMotion

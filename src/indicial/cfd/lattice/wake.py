@@ -116,11 +116,16 @@ def steady_wake(edge: Array, motion: RigidMotion, first: float, length: float) -
     """The wake of a body in steady motion, of no circulation yet.
 
     Straight to infinity without rotation; with it on helices, by lines `first` [m] apart and more, a twentieth of a
-    radian at most, until `length` [m], and straight on from there.
+    radian at most, until `length` [m], and straight on from there. That of a body at rest runs aft.
     """
     turning = float(np.linalg.norm(motion.rate))
     speed = np.linalg.norm(motion.at(edge), axis=1)
     fastest = float(np.max(speed))
+    if fastest == 0.0:
+        aft = np.array([1.0, 0.0, 0.0])
+        return WakeSheet(
+            edge[None], np.zeros((1, len(edge))), np.zeros((1, len(edge) - 1)), np.tile(aft, (1, len(edge), 1)), aft
+        )
     lines, path, step = [edge], [np.zeros(len(edge))], first / fastest
     if turning * length > 1e-12 * fastest:
         while np.max(path[-1]) < length:
