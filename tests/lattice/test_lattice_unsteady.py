@@ -1,4 +1,7 @@
 import math
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -231,3 +234,24 @@ def test_any_motion_is_marched_and_bad_times_are_refused() -> None:
     for bad in ([0.1, 0.2], [0.0, 0.2, 0.2], [0.0, math.nan]):
         with pytest.raises(InputError, match="times must"):
             solver.unsteady(STILL, motion, bad)
+
+
+THREADS = """
+import numba, numpy as np
+from indicial.cfd.lattice import Lattice, LatticeSolver
+from indicial.cfd.shapes import LiftingSurface
+from indicial.motion import AlphaStep, FlightCondition
+wing = LiftingSurface.wing("wing", 6.0, 1.0)
+condition, found = FlightCondition(0.2, alpha=0.05), []
+for threads in (1, 2):
+    numba.set_num_threads(threads)
+    solver = LatticeSolver(Lattice.of(wing, chordwise=4, spanwise=8), wing.reference((0.25, 0.0, 0.0)))
+    found.append(solver.unsteady(condition, AlphaStep(condition, 0.05), 0.004 * np.arange(8)).coefficients)
+assert np.array_equal(*found)
+"""
+
+
+@pytest.mark.slow
+def test_loads_do_not_depend_on_the_number_of_threads() -> None:
+    environment = os.environ | {"NUMBA_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "1"}
+    subprocess.run([sys.executable, "-c", THREADS], check=True, env=environment)
