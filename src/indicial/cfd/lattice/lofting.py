@@ -79,6 +79,8 @@ class Loft:
     stations : ndarray
         Index of the inner one of the two stations between which each section lies, shape (n,).
     surface : LiftingSurface
+    camber : bool
+        Whether the mean surface has the sections' camber; if not, it is that of the chords.
     """
 
     quarter_chord: Array
@@ -88,9 +90,10 @@ class Loft:
     fraction: Array
     stations: Index
     surface: LiftingSurface
+    camber: bool = True
 
     @classmethod
-    def at(cls, surface: LiftingSurface, places: Array) -> Loft:
+    def at(cls, surface: LiftingSurface, places: Array, camber: bool = True) -> Loft:
         """The sections at lengths from the first station [m], shape (n,)."""
         along = lengths(surface)
         inner = np.clip(np.searchsorted(along, places, side="right") - 1, 0, len(along) - 2)
@@ -110,6 +113,7 @@ class Loft:
             fraction,
             inner,
             surface,
+            camber,
         )
 
     def sections(self, n: int) -> tuple[WingSection, WingSection, float]:
@@ -119,6 +123,8 @@ class Loft:
 
     def _mean_lines(self, u: Array) -> tuple[Array, Array]:
         """Camber and slope at fractions u of the chord, mixed between the stations' sections, shape (len(u), n)."""
+        if not self.camber:
+            return np.zeros((len(u), len(self.chord))), np.zeros((len(u), len(self.chord)))
         lines = [station.section.mean_line(u) for station in self.surface.stations]
         camber, slope = (np.stack([line[part] for line in lines], axis=1) for part in (0, 1))
         inner, outer = self.stations, self.stations + 1

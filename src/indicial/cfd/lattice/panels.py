@@ -31,6 +31,7 @@ class Lattice:
 
     surfaces: tuple[LiftingSurface, ...]
     sheets: tuple[Sheet, ...]
+    camber: bool = True
 
     @classmethod
     def of(
@@ -41,6 +42,7 @@ class Lattice:
         spanwise: int | Mapping[str, int] = 20,
         chord_spacing: Spacing = "equal",
         span_spacing: Spacing = "cosine",
+        camber: bool = True,
     ) -> Lattice:
         """Cut surfaces into panels.
 
@@ -50,6 +52,8 @@ class Lattice:
             Panels along the chord, and across half a symmetric surface or the whole of another.
         chord_spacing, span_spacing : {"cosine", "equal"}
             Equal panels along the chord are second order in time too; cosine ones resolve a cambered nose.
+        camber : bool
+            Whether panels lie on the sections' mean lines, or on their chords: for section data, which have the camber.
 
         Raises
         ------
@@ -62,9 +66,9 @@ class Lattice:
         for surface in listed:
             u = chord_edges(_count(chordwise, surface.name, "chordwise"), chord_spacing)
             places = span_edges(surface, _count(spanwise, surface.name, "spanwise"), span_spacing)
-            sheets += sheets_of(surface, u, places, span_spacing)
+            sheets += sheets_of(surface, u, places, span_spacing, camber)
         refuse_crossing(sheets)
-        return cls(listed, tuple(sheets))
+        return cls(listed, tuple(sheets), camber)
 
     @cached_property
     def n_panels(self) -> int:

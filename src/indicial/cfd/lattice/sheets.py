@@ -87,19 +87,19 @@ class Sheet:
         return int(self.collocation.shape[1])
 
 
-def sheets_of(surface: LiftingSurface, u: Array, places: Array, spacing: Spacing) -> list[Sheet]:
+def sheets_of(surface: LiftingSurface, u: Array, places: Array, spacing: Spacing, camber: bool) -> list[Sheet]:
     """One sheet of a surface cut at fractions u of the chord and places across [m]; two if a gap parts its halves."""
-    right = _sheet(surface, u, places, spacing)
+    right = _sheet(surface, u, places, spacing, camber)
     if not surface.symmetric:
         return [right]
     left = _mirrored(right)
     return [_side_by_side(left, right)] if joined(surface) else [left, right]
 
 
-def _sheet(surface: LiftingSurface, u: Array, places: Array, spacing: Spacing) -> Sheet:
+def _sheet(surface: LiftingSurface, u: Array, places: Array, spacing: Spacing, camber: bool) -> Sheet:
     """The stations as they are listed."""
     middles_at = span_middles(surface, places, spacing)
-    cuts, middles = Loft.at(surface, places), Loft.at(surface, middles_at)
+    cuts, middles = Loft.at(surface, places, camber), Loft.at(surface, middles_at, camber)
     steps = np.diff(u)
     nodes = cuts.points(np.append(u[:-1] + 0.25 * steps, 1.0))
     share = ((middles_at - places[:-1]) / np.diff(places))[:, None]

@@ -112,7 +112,7 @@ class LatticeSolver:
         motion = self.motion(condition.velocity, rates.as_array())
         instant = steady_instant(self.influence(condition), motion, self.frozen(condition))
         loads = self.coefficients(instant.loads(instant.circulation()), condition)
-        return SteadyLoads(loads, condition, rates, self._reference, dict(self._provenance()))
+        return SteadyLoads(loads, condition, rates, self._reference, self.provenance)
 
     def unsteady(self, condition: FlightCondition, motion: Motion, times: ArrayLike) -> History:
         r"""Loads at `times` [s], which are the steps of the march too.
@@ -143,7 +143,7 @@ class LatticeSolver:
             (first, after_jump), (_, later) = kept
             loads[0] = self.coefficients(first.loads(after_jump, (later - after_jump) / t[1]), condition)
         per_time = 2.0 * condition.speed / self._reference.length
-        impulse = self.coefficients(_impulse(kept[0][0], start), condition) * per_time
+        impulse = self.coefficients(jump_impulse(kept[0][0], start), condition) * per_time
         return History(
             time=t,
             coefficients=loads,
@@ -153,7 +153,7 @@ class LatticeSolver:
             condition=condition,
             reference=self._reference,
             motion=motion.describe(),
-            provenance=self._provenance() | {"impulse": dict(zip(COEFFICIENTS, impulse.tolist(), strict=True))},
+            provenance=self.provenance | {"impulse": dict(zip(COEFFICIENTS, impulse.tolist(), strict=True))},
         )
 
     def linearise(self, condition: FlightCondition) -> LinearLattice:
@@ -187,7 +187,7 @@ class LatticeSolver:
         """
         names, ks = INPUTS if inputs is None else inputs, reduced_frequencies(k)
         check_inputs(names)
-        return frequency_response(self.linearise(condition), names, ks, self._provenance())
+        return frequency_response(self.linearise(condition), names, ks, self.provenance)
 
     def coefficients(self, loads: StripLoads, condition: FlightCondition) -> Array:
         """The six coefficients of all strips together, shape (6,)."""
@@ -196,7 +196,9 @@ class LatticeSolver:
         out: Array = np.concatenate([force, moment]) / (0.5 * condition.speed**2 * self._reference.area)
         return out
 
-    def _provenance(self) -> dict[str, Any]:
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """How loads are made (plain values)."""
         return {
             "solver": _SOLVER,
             "version": __version__,
@@ -206,7 +208,7 @@ class LatticeSolver:
         }
 
 
-def _impulse(after: Instant, before: Instant) -> StripLoads:
+def jump_impulse(after: Instant, before: Instant) -> StripLoads:
     """Impulse of the jump between two instants, loads times seconds."""
     influence = after.influence
     lattice = influence.lattice

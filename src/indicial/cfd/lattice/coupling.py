@@ -1,0 +1,158 @@
+r"""Section data on a lattice: the circulation of every strip is that of its section at the incidence it meets.
+
+Additional normalwash w, uniform over a strip, turns the lattice's attached flow into that of the section. In two
+dimensions the circulation of a strip is ``2 pi g (v + w)`` with the wind v across its chord, ``g = c cos(Lambda)/(2
+beta)``; so on a wing, where all other strips and all wakes induce their part of v,
+
+    v = Gamma/(2 pi g) - w,   alpha = atan2(v, u),   Gamma = g sqrt(u^2 + v^2) cl(alpha, x),   Gamma = Gamma_0 + R w
+
+with the wind u along the chord, the lattice's own ``Gamma_0`` and its response R to w. For given separation points x
+these are S equations for v, solved by Newton's method. With ``cl = 2 pi sin(alpha)`` w is nought and the lattice is
+left as it is.
+
+Incidence is read from circulation: of what is unsteady within a section (the part of its own wake in its lift, its
+added mass) the lattice keeps its own, and the section sees none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from indicial.cfd.lattice.instant import Instant, StripLoads
+from indicial.cfd.lattice.panels import Lattice
+from indicial.cfd.lattice.separation import StripSections
+from indicial.conventions import Array
+from indicial.errors import DivergenceError
+
+_ITERATIONS = 60
+_TOLERANCE = 1e-11
+_SMALLEST_STEP = 1e-6
+
+
+@dataclass(frozen=True)
+class StripProblem:
+    """The lattice as its strips see it at one instant.
+
+    Parameters
+    ----------
+    free : ndarray
+        Gamma_0, circulation of the strips without additional normalwash (S,) [m^2/s].
+    response : ndarray
+        R, shape (S, S) [m].
+    along : ndarray
+        u, the undisturbed wind along the chords (S,) [m/s].
+    size : ndarray
+        g, shape (S,) [m].
+    """
+
+    free: Array
+    response: Array
+    along: Array
+    size: Array
+
+    @classmethod
+    def at(cls, instant: Instant) -> StripProblem:
+        """Of an instant of the lattice."""
+        lattice = instant.influence.lattice
+        return cls(
+            instant.circulation()[lattice.trailing],
+            instant.response[lattice.trailing],
+            np.sum(instant.strip_wind * lattice.strips.aft, axis=1),
+            lattice.strips.chord * sweep_cosine(lattice) / (2.0 * instant.influence.beta),
+        )
+
+    def between(self, later: StripProblem, fraction: float) -> StripProblem:
+        """Linear between two instants."""
+
+        def mean(one: Array, two: Array) -> Array:
+            return (1.0 - fraction) * one + fraction * two
+
+        return StripProblem(
+            mean(self.free, later.free),
+            mean(self.response, later.response),
+            mean(self.along, later.along),
+            self.size,
+        )
+
+    def incidence(self, across: Array) -> Array:
+        """alpha of the strips (S,) [rad] with the wind v across their chords (S,) [m/s]."""
+        return np.arctan2(across, self.along)
+
+    def wash(self, across: Array, circulation: Array) -> Array:
+        """w (S,) [m/s]."""
+        return circulation / (2.0 * np.pi * self.size) - across
+
+    def circulation(self, sections: StripSections, across: Array, point: Array | None) -> tuple[Array, Array]:
+        """Gamma of the sections (S,) and its slope against v; static at None for `point`."""
+        speed = np.maximum(np.hypot(self.along, across), 1e-12)
+        alpha = self.incidence(across)
+        cl, slope = sections.polar_lift(alpha) if point is None else sections.lift(alpha, point)
+        return self.size * speed * cl, self.size * (across / speed * cl + self.along / speed * slope)
+
+    def solve(self, sections: StripSections, across: Array, point: Array | None) -> tuple[Array, Array]:
+        """v and Gamma (S,) for fixed separation points, or static ones; from a guess of v.
+
+        Raises
+        ------
+        DivergenceError
+            If Newton's method stalls.
+        """
+        inner = np.eye(across.size) - self.response / (2.0 * np.pi * self.size)
+
+        def residual(v: Array) -> tuple[Array, Array, Array]:
+            gamma, slope = self.circulation(sections, v, point)
+            return inner @ gamma + self.response @ v - self.free, gamma, slope
+
+        v = across.copy()
+        off, gamma, slope = residual(v)
+        scale = float(np.max(self.size * np.hypot(self.along, v))) + 1e-300
+        for _ in range(_ITERATIONS):
+            size = float(np.max(np.abs(off)))
+            if size <= _TOLERANCE * scale:
+                return v, gamma
+            try:
+                step = np.linalg.solve(inner * slope + self.response, -off)
+            except np.linalg.LinAlgError:
+                break
+            part = 1.0
+            while True:
+                trial = residual(v + part * step)
+                if float(np.max(np.abs(trial[0]))) < size or part < _SMALLEST_STEP:
+                    break
+                part *= 0.5
+            if part < _SMALLEST_STEP:
+                break
+            v = v + part * step
+            off, gamma, slope = trial
+        # what round-off leaves is no failure
+        if float(np.max(np.abs(off))) <= 1e3 * _TOLERANCE * scale:
+            return v, gamma
+        raise DivergenceError(f"section lift and lattice do not meet: residual {np.max(np.abs(off)) / scale:.1e}")
+
+
+def sweep_cosine(lattice: Lattice) -> Array:
+    """Cosine of the angle between quarter-chord line and the plane across the chord, of each strip (S,)."""
+    found = []
+    for sheet in lattice.sheets:
+        line = 0.75 * sheet.edges[0] + 0.25 * sheet.edges[-1]
+        side = line[1:] - line[:-1]
+        aft = np.sum(side * sheet.strips.aft, axis=1)
+        length = np.linalg.norm(side, axis=1)
+        found.append(np.sqrt(np.maximum(1.0 - (aft / length) ** 2, 0.0)))
+    return np.concatenate(found)
+
+
+def viscous_loads(instant: Instant, sections: StripSections, across: Array, point: Array) -> StripLoads:
+    """Drag and moment of the sections, which the lattice has not, per unit density."""
+    strips = instant.influence.lattice.strips
+    along = np.sum(instant.strip_wind * strips.aft, axis=1)
+    alpha = np.arctan2(across, along)
+    cd, cm = sections.drag_and_moment(alpha, point)
+    wind = along[:, None] * strips.aft + across[:, None] * strips.up
+    speed = np.linalg.norm(wind, axis=1)
+    force = 0.5 * (strips.area * speed * cd)[:, None] * wind
+    # nose up is a turn about the span, to the right
+    pitch = 0.5 * (strips.area * strips.chord * speed**2 * cm)[:, None] * strips.span
+    return StripLoads(force, pitch + np.cross(strips.quarter_chord - instant.motion.centre, force))
