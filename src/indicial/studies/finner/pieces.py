@@ -47,7 +47,7 @@ SUPERSONIC = tuple(sorted((*BETWEEN_SUPERSONIC, *(mach for mach in FLIGHTS if ma
 FIVE = (1.293, 1.5, 2.0, 2.718, 4.0)
 """Mach numbers of the time marches in all motions."""
 
-ABOUT_THE_JUMP = (1.12, 1.16, 1.2, 1.24)
+ABOUT_THE_JUMP = {"quick": (1.12, 1.16, 1.2, 1.24), "medium": (1.16, 1.2)}
 """Mach numbers of the marches that give Cm_alphadot: plunging, and steps."""
 
 MARCHED = ("quick", "medium")
@@ -104,7 +104,7 @@ def _moving_frame() -> list[Piece]:
 
 def _marches(level: str) -> list[Piece]:
     listed = []
-    for mach in sorted((*ABOUT_THE_JUMP, *FIVE)):
+    for mach in sorted((*ABOUT_THE_JUMP[level], *FIVE)):
         kind = _kind(mach)
         motions = ["plunge"] if mach not in FIVE else ["plunge", "pitch_rate"]
         if level == "quick" and mach in FIVE:
