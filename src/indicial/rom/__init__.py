@@ -12,6 +12,7 @@ from indicial.rom.projection import HeldOut, OrderTrial, Projection, project
 from indicial.rom.quasi_steady import QuasiSteadyError, QuasiSteadyModel, quasi_steady_error
 from indicial.rom.realisation import realise
 from indicial.rom.response import StepResponse, StepResponses
+from indicial.rom.schedule import LeftOut, ScheduledModel, best_schedule, leave_one_out, schedule
 from indicial.rom.state_space import Candidate, ChannelError, StateSpaceModel
 from indicial.rom.streaming import Stream, advance, stream
 from indicial.rom.uncertainty import PredictedBand, UncertainModel, refine_model
@@ -26,6 +27,7 @@ __all__ = [
     "ConvolutionModel",
     "DeficiencyIntegral",
     "HeldOut",
+    "LeftOut",
     "OrderTrial",
     "PredictedBand",
     "PredictionCheck",
@@ -33,6 +35,7 @@ __all__ = [
     "QuasiSteadyError",
     "QuasiSteadyModel",
     "ReducedModel",
+    "ScheduledModel",
     "StateSpaceModel",
     "StepResponse",
     "StepResponses",
@@ -40,16 +43,19 @@ __all__ = [
     "Truncation",
     "UncertainModel",
     "advance",
+    "best_schedule",
     "build_model",
     "check_prediction",
     "compare",
     "deficiency",
     "deficiency_integral",
     "identify",
+    "leave_one_out",
     "project",
     "quasi_steady_error",
     "realise",
     "refine_model",
+    "schedule",
     "stream",
     "truncate",
 ]

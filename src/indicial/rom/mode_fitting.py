@@ -104,7 +104,7 @@ class FrequencyTarget(Target):
 
 
 @dataclass(frozen=True)
-class _Fit:
+class LinearFit:
     """The linear problem at given modes: amplitudes, and what its derivative needs."""
 
     amplitudes: Array
@@ -113,7 +113,8 @@ class _Fit:
     range: Array  # orthonormal range of what the data may choose, (n, n_free)
 
 
-def _solve(modes: Modes, target: Target) -> _Fit:
+def solve(modes: Modes, target: Target) -> LinearFit:
+    """The linear problem at given modes: least error with the constraints imposed."""
     rows, values = [modes.basis(np.zeros(1))[0]], [target.initial]
     if target.integral is not None and modes.order > 1:
         rows.append(modes.integral(target.horizon))
@@ -130,12 +131,12 @@ def _solve(modes: Modes, target: Target) -> _Fit:
     kept = singular > 1e-13 * np.max(singular, initial=0.0)
     left, singular, right = left[:, kept], singular[kept], right[kept]
     chosen = right.T @ ((left.T @ (root * target.values - weighted @ particular)) / singular[:, None])
-    return _Fit(particular + free @ chosen, basis, inverse, left)
+    return LinearFit(particular + free @ chosen, basis, inverse, left)
 
 
 def fit_amplitudes(modes: Modes, target: Target) -> Array:
     """Amplitudes of least error with the initial value, and the integral, imposed; shape (order, n_outputs)."""
-    return _solve(modes, target).amplitudes
+    return solve(modes, target).amplitudes
 
 
 def joint_error(modes: Modes, targets: Sequence[Target]) -> float:
@@ -144,7 +145,7 @@ def joint_error(modes: Modes, targets: Sequence[Target]) -> float:
     return float(np.linalg.norm(errors) / np.sqrt(len(errors)))
 
 
-def _gradient(modes: Modes, fit: _Fit, target: Target) -> Array:
+def gradient_of(modes: Modes, fit: LinearFit, target: Target) -> Array:
     """Change of the residual with the modes' parameters, shape (n n_outputs, order).
 
     Kaufman's approximation (BIT 15, 1975) of the variable-projection Jacobian, with the constraints followed.
@@ -189,12 +190,12 @@ def refine(start: Modes, targets: Sequence[Target], tolerance: float = 1e-6, eva
         Most evaluations of the misfit.
     """
 
-    latest: dict[bytes, list[_Fit]] = {}  # the gradient is asked for where the misfit was
+    latest: dict[bytes, list[LinearFit]] = {}  # the gradient is asked for where the misfit was
 
-    def fits(vector: Array) -> list[_Fit]:
+    def fits(vector: Array) -> list[LinearFit]:
         if vector.tobytes() not in latest:
             latest.clear()
-            latest[vector.tobytes()] = [_solve(start.from_vector(vector), target) for target in targets]
+            latest[vector.tobytes()] = [solve(start.from_vector(vector), target) for target in targets]
         return latest[vector.tobytes()]
 
     def misfit(vector: Array) -> Array:
@@ -203,7 +204,7 @@ def refine(start: Modes, targets: Sequence[Target], tolerance: float = 1e-6, eva
 
     def gradient(vector: Array) -> Array:
         modes = start.from_vector(vector)
-        return np.vstack([_gradient(modes, fit, one) for one, fit in zip(targets, fits(vector), strict=True)])
+        return np.vstack([gradient_of(modes, fit, one) for one, fit in zip(targets, fits(vector), strict=True)])
 
     first = clipped(start, targets)
     bounds = first.bounds(*rate_bounds(targets))
