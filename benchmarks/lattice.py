@@ -138,9 +138,11 @@ def _draw(panels: Array, by_panels: list[float], by_steps: list[float], theirs: 
         right.loglog(PEER_STEPS, theirs, "s--", label="Ptera Software, 400 panels")
     left.set(xlabel="panels", ylabel="processor time [s]")
     right.set(xlabel="steps", ylabel="processor time [s]")
-    for axes in (left, right):
+    for axes, places in ((left, panels), (right, np.array(STEPS))):
+        axes.minorticks_off()
+        axes.set_xticks(places, [f"{place:g}" for place in places])
         axes.legend()
-        axes.grid(True, which="both", alpha=0.3)
+        axes.grid(True, alpha=0.3)
     folder = Path(__file__).parent / "out"
     folder.mkdir(exist_ok=True)
     figure.savefig(folder / "lattice.png", dpi=150)
