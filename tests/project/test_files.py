@@ -27,3 +27,16 @@ def test_changed_code_has_another_name_and_the_same_code_the_same(
     first = digest(tmp_path, monkeypatch, "GAMMA = 1.4\n")
     assert digest(tmp_path, monkeypatch, "GAMMA = 1.4\n") == first
     assert digest(tmp_path, monkeypatch, "GAMMA = 1.3\n") != first
+
+
+def test_code_that_is_left_out_does_not_change_the_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def names(text: str) -> tuple[str, str]:
+        inner = tmp_path / "somecode" / "apart"
+        inner.mkdir(parents=True, exist_ok=True)
+        (inner / "__init__.py").write_text(text)
+        whole = digest(tmp_path, monkeypatch, "GAMMA = 1.4\n")
+        return whole, sources_digest("somecode", without="apart")
+
+    (whole, rest), (whole_changed, rest_changed) = names("A = 1\n"), names("A = 2\n")
+    assert whole != whole_changed
+    assert rest == rest_changed

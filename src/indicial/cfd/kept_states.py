@@ -43,7 +43,7 @@ class KeptStates:
         """A name for a computation on this mesh by the present code."""
         digest = hashlib.sha256(self.mesh_key.encode())
         digest.update(self._of.encode())
-        digest.update(sources_digest("indicial.cfd").encode())
+        digest.update(sources_digest("indicial.cfd", without="lattice").encode())
         for part in parts:
             if isinstance(part, np.ndarray):
                 digest.update(np.ascontiguousarray(part).tobytes())
