@@ -8,6 +8,7 @@ from indicial.rom.convolution import ConvolutionModel
 from indicial.rom.deficiency import DeficiencyIntegral, deficiency, deficiency_integral
 from indicial.rom.identification import identify
 from indicial.rom.model import ReducedModel
+from indicial.rom.nonlinear import NonlinearModel, nonlinear_model
 from indicial.rom.projection import HeldOut, OrderTrial, Projection, project
 from indicial.rom.quasi_steady import QuasiSteadyError, QuasiSteadyModel, quasi_steady_error
 from indicial.rom.realisation import realise
@@ -28,6 +29,7 @@ __all__ = [
     "DeficiencyIntegral",
     "HeldOut",
     "LeftOut",
+    "NonlinearModel",
     "OrderTrial",
     "PredictedBand",
     "PredictionCheck",
@@ -51,6 +53,7 @@ __all__ = [
     "deficiency_integral",
     "identify",
     "leave_one_out",
+    "nonlinear_model",
     "project",
     "quasi_steady_error",
     "realise",

@@ -13,6 +13,7 @@ from indicial.conventions import Array
 from indicial.errors import InputError
 from indicial.history import History
 from indicial.rom.model import ReducedModel
+from indicial.rom.nonlinear import NonlinearModel
 from indicial.rom.signals import quadrature_weights
 
 if TYPE_CHECKING:
@@ -135,7 +136,7 @@ class PredictionCheck:
 
 
 def check_prediction(
-    model: ReducedModel, measured: History, *, since: float = 0.0, neglect: tuple[str, ...] = ()
+    model: ReducedModel | NonlinearModel, measured: History, *, since: float = 0.0, neglect: tuple[str, ...] = ()
 ) -> PredictionCheck:
     """Predict the loads of a history's motion and compare them with those it holds.
 
@@ -143,7 +144,7 @@ def check_prediction(
 
     Parameters
     ----------
-    model : ReducedModel
+    model : ReducedModel or NonlinearModel
     measured : History
         Not used to make the model, or the check says nothing.
     since : float

@@ -41,6 +41,7 @@ SCHEMA_VERSION = 1
 FORMAT = "indicial scheduled model"
 
 _ENOUGH = 1.25
+_EVALUATIONS = 60
 
 
 @dataclass(frozen=True)
@@ -263,7 +264,7 @@ class ScheduledModel:
 
 
 def schedule(
-    points: Sequence[StepResponses], order: int = 4, *, degree: int = 1, evaluations: int = 60
+    points: Sequence[StepResponses], order: int = 4, *, degree: int = 1, evaluations: int = _EVALUATIONS
 ) -> ScheduledModel:
     """A model over the conditions of several sets of step responses.
 
@@ -283,7 +284,24 @@ def schedule(
     InputError
         If the points do not fill a grid, or differ in anything but Mach number and alpha.
     """
-    known = sorted(points, key=lambda one: (one.condition.mach, one.condition.alpha))
+    return _scheduled([_Point.of(one) for one in points], order, degree, evaluations)
+
+
+@dataclass(frozen=True)
+class _Point:
+    """Step responses at one condition, and what is fitted of them, made once for all fits."""
+
+    data: StepResponses
+    sources: dict[str, StepSource]
+
+    @classmethod
+    def of(cls, data: StepResponses) -> _Point:
+        return cls(data, {response.input: StepSource(response) for response in data.responses})
+
+
+def _scheduled(points: Sequence[_Point], order: int, degree: int, evaluations: int) -> ScheduledModel:
+    points = sorted(points, key=lambda one: (one.data.condition.mach, one.data.condition.alpha))
+    known = [one.data for one in points]
     if len(known) < 2:
         raise InputError("a schedule needs two conditions or more")
     first = known[0]
@@ -297,9 +315,9 @@ def schedule(
     families, amplitudes, integrals = [], [], []
     with threadpool_limits(limits=1, user_api="blas"):
         for name in first.inputs:
-            sources = [StepSource(one[name]) for one in known]
+            sources = [one.sources[name] for one in points]
             targets = [source.target("all", match_integral=True) for source in sources]
-            times = np.array([source.slowest for source in sources]) / StepSource(middle[name]).slowest
+            times = np.array([source.slowest for source in sources]) / sources[len(known) // 2].slowest
             alone = replace(middle, responses=(middle[name],))
             start = realise(alone, "modal", order)
             family, found = fit_family(_modes_of(start), times, nodes, targets, degree, evaluations)
@@ -323,16 +341,20 @@ def schedule(
 
 
 def leave_one_out(
-    points: Sequence[StepResponses], order: int = 4, *, degree: int = 1, evaluations: int = 60
+    points: Sequence[StepResponses], order: int = 4, *, degree: int = 1, evaluations: int = _EVALUATIONS
 ) -> tuple[LeftOut, ...]:
     """Each Mach number but the first and last in turn left out of the schedule, and predicted by it."""
-    machs = sorted({one.condition.mach for one in points})
+    return _left_out([_Point.of(one) for one in points], order, degree, evaluations)
+
+
+def _left_out(points: Sequence[_Point], order: int, degree: int, evaluations: int) -> tuple[LeftOut, ...]:
+    machs = sorted({one.data.condition.mach for one in points})
     results = []
     for mach in machs[1:-1]:
-        others = [one for one in points if one.condition.mach != mach]
-        model = schedule(others, order, degree=degree, evaluations=evaluations)
+        others = [one for one in points if one.data.condition.mach != mach]
+        model = _scheduled(others, order, degree, evaluations)
         errors: dict[tuple[str, str], float] = {}
-        for one in (one for one in points if one.condition.mach == mach):
+        for one in (one.data for one in points if one.data.condition.mach == mach):
             here = model.at(mach, one.condition.alpha)
             for response in one.responses:
                 found = here.step(response.s)[response.input].values
@@ -363,12 +385,13 @@ def best_schedule(
     """
     if len({one.condition.mach for one in points}) < 3:
         raise InputError("no Mach number can be left out of fewer than three: choose order and degree yourself")
+    prepared = [_Point.of(one) for one in points]
     tried: list[tuple[float, int, int, tuple[LeftOut, ...]]] = []
     reason = ""
     for order in orders:
         for degree in degrees:
             try:
-                found = leave_one_out(points, order, degree=degree)
+                found = _left_out(prepared, order, degree, _EVALUATIONS)
             except InputError as error:
                 reason = str(error)
                 continue
@@ -377,7 +400,7 @@ def best_schedule(
         raise InputError(reason)
     enough = max(_ENOUGH * min(one[0] for one in tried), tolerance)
     _, order, degree, errors = min((one for one in tried if one[0] <= enough), key=lambda one: (one[1], one[0]))
-    return schedule(points, order, degree=degree), errors
+    return _scheduled(prepared, order, degree, _EVALUATIONS), errors
 
 
 def _modes_of(model: StateSpaceModel) -> Modes:

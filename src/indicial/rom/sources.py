@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -97,7 +98,7 @@ class StepSource(Source):
 
     def target(self, part: Part, match_integral: bool) -> TimeTarget:
         r, kept = self.response, self._kept(part)
-        integral, horizon = self._integral()
+        integral, horizon = self._integral
         weights = quadrature_weights(r.s)[kept] if part == "held out" else quadrature_weights(r.s[kept])
         if part == "held out":
             weights *= r.s[-1] / np.sum(weights)  # errors are means over the whole record
@@ -119,6 +120,7 @@ class StepSource(Source):
         inside: Array = np.where((grid <= target.s[-1])[:, None], curve(np.minimum(grid, target.s[-1])), 0.0)
         return inside
 
+    @cached_property
     def _integral(self) -> tuple[Array, float]:
         """Integral of the deficiency functions, shape (n_outputs,), and up to when.
 
