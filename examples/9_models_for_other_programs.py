@@ -115,9 +115,10 @@ if importlib.util.find_spec("jsbsim"):
 
     def frame() -> tuple[np.ndarray, float, list[float]]:
         """Inputs of the model, speed [m/s], and what the exported model makes of them in JSBSim."""
-        metres_per_second = 0.3048 * program["velocities/vt-fps"]
-        dimensionless = program["velocities/q-aero-rad_sec"] * chord / (2.0 * metres_per_second)
-        motion = np.array([program["aero/alpha-rad"], dimensionless])
+        metres_per_second, pitch_rate = 0.3048 * program["velocities/vt-fps"], program["velocities/q-aero-rad_sec"]
+        forward, down = (0.3048 * program[f"velocities/{axis}-aero-fps"] for axis in "uw")
+        down += 0.2 * pitch_rate  # at the leading edge, 0.2 m behind the centre of gravity
+        motion = np.array([np.arctan2(down, forward), pitch_rate * chord / (2.0 * metres_per_second)])
         return motion, metres_per_second, [program["indicial/CN"], program["indicial/Cm"]]
 
     motion, metres_per_second, _ = frame()

@@ -70,7 +70,7 @@ def read_netcdf(path: str | Path, format_: str, version: int) -> xarray.Dataset:
 
 def check_format(path: str | Path, attributes: Mapping[Any, Any], format_: str, version: int) -> None:
     """Raise InputError unless `attributes` name this format and version."""
-    if attributes.get("format") != format_ or int(attributes.get("schema_version", 0)) != version:
+    if attributes.get("format") != format_ or str(attributes.get("schema_version")) != str(version):
         raise InputError(f"{path}: not a file of {format_}, schema version {version}")
 
 

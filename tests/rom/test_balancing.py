@@ -73,7 +73,26 @@ def test_the_fewest_states_within_the_tolerance_are_taken() -> None:
     assert len(cut.plot().axes) == 1
 
 
+def test_states_without_effect_do_not_stand_in_the_way_of_any_order() -> None:
+    """Their Hankel singular values are nothing but round-off, by which no coordinates can be divided."""
+    known = known_model()
+    a = np.block([[known.a, np.zeros((5, 2))], [np.ones((2, 5)), -np.eye(2)]])
+    model = replace(known, a=a, b=np.vstack([known.b, np.ones((2, 2))]), c=np.hstack([known.c, np.zeros((2, 2))]))
+    turn = np.linalg.qr(np.random.default_rng(3).normal(size=(7, 7)))[0]
+    turned = replace(model, a=turn @ model.a @ turn.T, b=turn @ model.b, c=model.c @ turn.T)
+    for one in (model, turned):
+        for order in (5, 6, 7):
+            cut = truncate(one, order)
+            assert cut.error < 1e-9
+            assert cut.bound is not None
+            assert cut.error <= cut.bound
+        assert truncate(one, tolerance=1e-15).error <= 1e-15
+
+
 def test_orders_out_of_range_are_refused() -> None:
+    none = replace(known_model(), a=np.zeros((0, 0)), b=np.zeros((0, 2)), c=np.zeros((2, 0)))
+    with pytest.raises(InputError, match="no states"):
+        truncate(none)
     with pytest.raises(InputError, match="order is 3"):
         truncate(large_model(), 3, k_max=0.5)
     with pytest.raises(InputError, match="order is 15"):

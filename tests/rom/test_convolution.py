@@ -217,6 +217,25 @@ def test_what_a_model_cannot_follow_is_refused() -> None:
         model.steady(FlightCondition(2.5))
     with pytest.raises(InputError, match="times is missing"):
         model.predict(motion)
+    # its reduced time and its rates are made with another length
+    other = replace(model.predict(motion, times), reference=replace(model.reference, length=2.0))
+    with pytest.raises(InputError, match="reference quantities"):
+        model.predict(other)
+
+
+@pytest.mark.parametrize(
+    ("s", "values", "before", "reason"),
+    [
+        ([0.0, 1.0, 1.0], np.zeros((3, 2)), np.zeros(2), "strictly increasing"),
+        ([0.0, np.nan, 1.0], np.zeros((3, 2)), np.zeros(2), "strictly increasing"),
+        ([0.0, 1.0, 2.0], np.zeros((2, 2)), np.zeros(2), "do not fit 3 samples"),
+        ([0.0, 1.0, 2.0], np.zeros((3, 2)), np.zeros(1), "do not fit 3 samples"),
+        ([0.0, 1.0, 2.0], np.full((3, 2), np.nan), np.zeros(2), "not finite"),
+    ],
+)
+def test_inputs_that_are_none_are_refused(s: list[float], values: Array, before: Array, reason: str) -> None:
+    with pytest.raises(InputError, match=reason):
+        MotionInputs(np.array(s), values, before)
 
 
 def test_quasi_steady_model_is_the_tangent_of_the_full_response() -> None:

@@ -7,6 +7,7 @@ import json
 import shutil
 import subprocess
 import sys
+import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -277,6 +278,32 @@ def test_fmu_compiled_from_its_sources_takes_steps_back(tmp_path: Path) -> None:
     np.testing.assert_allclose(results[0], exact[1], atol=1e-12)
 
 
+@needs_compiler
+@pytest.mark.skipif(sys.platform != "linux", reason="names of libraries are apart elsewhere")
+def test_two_fmus_in_one_space_of_names_stay_apart(tmp_path: Path) -> None:
+    """A program may load all its libraries into one, where the first function of a name is that of all."""
+    script = """
+import ctypes, sys
+for library, guid in zip(sys.argv[1::2], sys.argv[2::2]):
+    fmu = ctypes.CDLL(library, mode=ctypes.RTLD_GLOBAL)
+    fmu.fmi2Instantiate.restype = ctypes.c_void_p
+    one = ctypes.c_void_p(fmu.fmi2Instantiate(b"one", 1, guid.encode(), b"", None, 0, 0))
+    fmu.fmi2ExitInitializationMode(one)
+    loads = (ctypes.c_double * 6)()
+    fmu.fmi2GetReal(one, (ctypes.c_uint * 6)(4, 5, 6, 7, 8, 9), ctypes.c_size_t(6), loads)
+    print(*loads)
+"""
+    models, arguments = (any_model(), any_model(5, seed=9)), []
+    for i, model in enumerate(models):
+        (path,) = export(model, "fmu", tmp_path / f"{i}.fmu")
+        with zipfile.ZipFile(path) as archive:
+            library = archive.extract("binaries/linux64/indicial_model.so", tmp_path / str(i))
+            arguments += [library, archive.read("modelDescription.xml").decode().split('guid="')[1].split('"')[0]]
+    done = subprocess.run([sys.executable, "-c", script, *arguments], capture_output=True, text=True, check=True)
+    found = np.array([line.split() for line in done.stdout.splitlines()], dtype=float)
+    np.testing.assert_allclose(found, [model.baseline for model in models], atol=1e-12)
+
+
 def test_fmu_without_a_compiler_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setenv("PATH", str(tmp_path))
@@ -293,6 +320,8 @@ def test_exports_that_cannot_be_are_refused(tmp_path: Path) -> None:
         export(model, "fmu", tmp_path / "model.zip")
     with pytest.raises(InputError, match="letters, digits"):
         export(model, "c", tmp_path / "my-model.c")
+    with pytest.raises(InputError, match="no word of C"):
+        export(model, "c", tmp_path / "double.c")
     double = replace(any_model(2), a=np.array([[-0.5, 1.0], [0.0, -0.5]]))
     for to in ("c", "fmu", "jsbsim"):
         with pytest.raises(InputError, match="no modal form"):
@@ -316,7 +345,7 @@ AIRCRAFT = """<?xml version="1.0"?>
   </metrics>
   <mass_balance>
     <ixx unit="KG*M2">2e5</ixx><iyy unit="KG*M2">2e5</iyy><izz unit="KG*M2">2e5</izz>
-    <emptywt unit="KG">4e3</emptywt><location name="CG" unit="M"><x>0.3</x><y>0</y><z>0</z></location>
+    <emptywt unit="KG">4e3</emptywt><location name="CG" unit="M"><x>0.1</x><y>0.02</y><z>-0.05</z></location>
   </mass_balance>
   <ground_reactions/><propulsion/>
   <system file="wing_memory"/><system file="lag"/>
@@ -353,9 +382,20 @@ def jsbsim_aircraft(model: StateSpaceModel, folder: Path, static: Any = None) ->
     return program
 
 
+def reference_point(program: Any) -> Array:
+    """Of the moments [ft], body axes, from the centre of gravity."""
+    structural = [program[f"metrics/aero-rp-{axis}-in"] - program[f"inertia/cg-{axis}-in"] for axis in "xyz"]
+    place: Array = np.array(structural) * [-1.0, 1.0, -1.0] / 12.0
+    np.testing.assert_allclose(place * 0.3048, [-0.2, -0.02, -0.05], rtol=1e-6)
+    return place
+
+
 def watch(program: Any) -> tuple[Array, float, float, Array]:
     """Inputs of the model, speed [m/s], dt [s] and the coefficients, of one frame."""
-    motion = [program["aero/alpha-rad"], program["velocities/p-aero-rad_sec"], program["velocities/q-aero-rad_sec"]]
+    p, q, r = (program[f"velocities/{name}-aero-rad_sec"] for name in "pqr")
+    u, _, w = (program[f"velocities/{name}-aero-fps"] * 0.3048 for name in "uvw")
+    x, y, z = reference_point(program) * 0.3048
+    motion = [np.arctan2(w + p * y - q * x, u + q * z - r * y), p, q]
     speed = program["velocities/vt-fps"] * 0.3048
     loads = np.array([program[f"indicial/{name}"] for name in COEFFICIENTS])
     return dimensionless(np.array([motion]), speed)[0], speed, program["simulation/dt"], loads
@@ -395,7 +435,8 @@ def test_jsbsim_applies_the_loads_in_its_body_axes(tmp_path: Path) -> None:
     np.testing.assert_allclose(forces, pressure * 0.2 * loads[:3] * [-1.0, 1.0, -1.0], rtol=1e-10)
     moments = [program[f"moments/{axis}-aero-lbsft"] for axis in "lmn"]
     lengths = np.array([1.3, 0.5, 1.3]) / 0.3048
-    np.testing.assert_allclose(moments, pressure * 0.2 * loads[3:] * lengths, rtol=1e-10)
+    transferred = np.cross(reference_point(program), forces)
+    np.testing.assert_allclose(moments, pressure * 0.2 * loads[3:] * lengths + transferred, rtol=1e-10)
 
 
 def test_static_curves_are_tables_in_jsbsim_about_which_the_memory_is_linear(tmp_path: Path) -> None:

@@ -182,3 +182,10 @@ def test_varying_speed_is_followed_in_reduced_time() -> None:
 def test_inputs_before_that_do_not_fit_are_refused() -> None:
     with pytest.raises(InputError, match="shape \\(3,\\)"):
         stream(random_model(), [0.1])
+
+
+def test_steps_that_do_not_fit_the_model_are_refused() -> None:
+    flow = stream(random_model())
+    for inputs, ds, loads in ((3, 0.1, 7), (3, 0.1, 2), (2, 0.1, 6), (3, -0.1, 6)):
+        with pytest.raises(InputError, match="step"):
+            advance(flow, np.zeros(inputs), ds, np.empty(loads))

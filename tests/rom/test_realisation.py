@@ -13,6 +13,7 @@ from indicial.rom import StepResponse, StepResponses, check_prediction, deficien
 from indicial.rom.era import era_modes, hankel
 from indicial.rom.mode_fitting import TimeTarget, fit_amplitudes, refine
 from indicial.rom.modes import Modes
+from indicial.rom.realisation import Method, Poles
 from rom.cases import COLUMNS, CONDITION, OUTPUTS, REFERENCE, ROWS, graded, known_system, plate, responses
 from theory.linear import NoisySolver, incompressible_airfoil, theodorsen
 
@@ -183,6 +184,17 @@ def test_quasi_steady_output_beside_a_lagging_one_is_kept() -> None:
     model = realise(data)
     assert model.order == 1
     np.testing.assert_allclose(model.frequency_response(0.7)[0, 0, 0], 2.0, atol=1e-4)
+
+
+@pytest.mark.parametrize("method", ["auto", "exponential", "era", "modal"])
+@pytest.mark.parametrize("poles", ["separate", "shared"])
+def test_input_that_is_answered_at_once_is_kept(method: Method, poles: Poles) -> None:
+    """No lag at all, or no load: there is no pole to be found."""
+    data = responses(known_system(), CONDITION, graded(40.0, 120))
+    for value in (0.7, 0.0):
+        flat = replace(data["q"], values=np.full_like(data["q"].values, value))
+        model = realise(replace(data, responses=(data["alpha"], flat)), method, poles=poles)
+        np.testing.assert_allclose(model.step(flat.s)["q"].values, value, atol=1e-12)
 
 
 def test_too_few_samples_and_bad_choices_are_refused() -> None:

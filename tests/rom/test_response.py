@@ -71,6 +71,14 @@ def test_bad_histories_are_refused_with_the_reason() -> None:
         StepResponses.from_histories([])
 
 
+@pytest.mark.parametrize("s", [[0.0, np.nan, 2.0], [0.0, 1.0, np.inf]])
+def test_reduced_times_that_are_none_are_refused(s: list[float]) -> None:
+    with pytest.raises(InputError, match="increase strictly"):
+        StepResponse("alpha", np.array(s), np.ones((3, 1)))
+    with pytest.raises(InputError, match="n_outputs"):
+        StepResponse("alpha", np.arange(3.0), np.ones(3))
+
+
 def test_final_value_given_takes_the_place_of_the_last_sample() -> None:
     short = StepResponse("alpha", np.array([0.0, 1.0, 2.0]), np.array([[1.0], [2.0], [3.0]]), final=np.array([4.0]))
     np.testing.assert_array_equal(short.deficiency[:, 0], [3.0, 2.0, 1.0])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import control
 import numpy as np
@@ -161,6 +162,33 @@ def test_file_of_another_schema_is_refused(tmp_path: Path) -> None:
     path.write_text("not json")
     with pytest.raises(InputError, match="not a readable JSON"):
         StateSpaceModel.from_json(path)
+
+
+@pytest.mark.parametrize(
+    ("damage", "reason"),
+    [
+        ({"d": None}, "missing"),
+        ({"a": [["x"]]}, "damaged"),
+        ({"condition": {"mach": 2.0, "wind": 1.0}}, "damaged"),
+        ({"a": np.eye(5).tolist()}, "not stable"),
+    ],
+)
+def test_damaged_file_is_refused_by_its_name(damage: dict[str, Any], reason: str, tmp_path: Path) -> None:
+    path = tmp_path / "model.json"
+    values = {**known_model().to_dict(), **damage}
+    path.write_text(json.dumps({name: value for name, value in values.items() if value is not None}))
+    with pytest.raises(InputError, match=rf"model\.json: .*{reason}"):
+        StateSpaceModel.from_json(path)
+
+
+def test_damaged_netcdf_file_is_refused(tmp_path: Path) -> None:
+    data = known_model().to_dataset()
+    data.drop_vars("D").to_netcdf(tmp_path / "part.nc", engine="h5netcdf")
+    with pytest.raises(InputError, match=r"part\.nc: damaged"):
+        StateSpaceModel.from_netcdf(tmp_path / "part.nc")
+    data.assign_attrs(schema_version="two").to_netcdf(tmp_path / "other.nc", engine="h5netcdf")
+    with pytest.raises(InputError, match="schema version 1"):
+        StateSpaceModel.from_netcdf(tmp_path / "other.nc")
 
 
 def test_unstable_or_misshapen_models_are_refused() -> None:

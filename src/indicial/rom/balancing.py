@@ -32,6 +32,8 @@ _Cut = Callable[[int], Reduced | None]
 
 _FREQUENCIES = 300
 _DECADES = 2.0  # beyond the slowest and the fastest pole
+_RESOLVED = 2e-8
+"""Hankel singular values below this, of the largest, are round-off: it enters the factors of Gramians as its root."""
 
 
 @dataclass(frozen=True)
@@ -107,8 +109,10 @@ def truncate(
     Raises
     ------
     InputError
-        If `order` is out of range; with `k_max` two states per input are the fewest.
+        If the model has no states, or `order` is out of range; with `k_max` two states per input are the fewest.
     """
+    if model.order == 0:
+        raise InputError("the model has no states, there is nothing to leave out")
     if k_max is not None and not (np.isfinite(k_max) and k_max > 0.0):
         raise InputError(f"k_max is {k_max}, must be positive and finite")
     full = Reduced(model.a, model.b, model.c, model.d)
@@ -134,7 +138,8 @@ def truncate(
     small = replace(
         model, a=reduced.a, b=reduced.b, c=reduced.c, d=reduced.d, method=f"{model.method}, {METHOD}", errors=()
     )
-    bound = float(2.0 * np.sum(hankel[reduced.order :])) if k_max is None else None
+    known = np.maximum(hankel, _RESOLVED * np.max(hankel))
+    bound = float(2.0 * np.sum(known[reduced.order :])) if k_max is None else None
     return Truncation(small, hankel, trials[-1].error, bound, tuple(trials))
 
 
@@ -170,12 +175,14 @@ def _balanced(full: Reduced, scale: Array) -> tuple[_Cut, Array]:
     excited = gramian_factor(full.a, full.b / inputs)
     seen = gramian_factor(full.a.T, (full.c / outputs[:, None]).T)
     left, hankel, right = np.linalg.svd(seen.T @ excited)
+    resolved = int(np.count_nonzero(hankel > _RESOLVED * np.max(hankel)))
 
     def cut(order: int) -> Reduced | None:
-        root = np.sqrt(hankel[:order])
-        if not np.all(root > 0.0):
-            return None
-        return full.within(seen @ left[:, :order] / root, excited @ right[:order].T / root)
+        if order == full.order:
+            return full
+        kept = min(order, resolved)
+        root = np.sqrt(hankel[:kept])
+        return full.within(seen @ left[:, :kept] / root, excited @ right[:kept].T / root)
 
     return cut, np.asarray(hankel)
 

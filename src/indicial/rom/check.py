@@ -157,8 +157,6 @@ def check_prediction(
     InputError
         If reference quantities differ, the model cannot follow the motion, or fewer than three samples are left.
     """
-    if measured.reference != model.reference:
-        raise InputError("history and model differ in reference quantities; convert one of them first")
     used = measured.s >= since
     if np.count_nonzero(used) < 3:
         raise InputError(f"fewer than three samples at or after s = {since:g}")

@@ -104,10 +104,13 @@ class ReducedModel(ABC):
         Raises
         ------
         InputError
-            If the motion varies an input that the model lacks, or is at another Mach number.
+            If the motion varies an input that the model lacks, is at another Mach number, or comes from a history of
+            other reference quantities (its reduced time and rates would be others).
         """
         if isinstance(motion, History):
             self._check(motion.condition)
+            if motion.reference != self.reference:
+                raise InputError("history and model differ in reference quantities; convert one of them first")
             if times is not None:
                 raise InputError("times are those of the history to predict; give times with a Motion only")
             inputs = MotionInputs.from_history(motion, self.inputs, self.condition, neglect=neglect, substeps=substeps)

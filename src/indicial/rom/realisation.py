@@ -218,8 +218,10 @@ def _trials(
         errors: list[float] = []
         for order in orders:
             modes = _best_modes(method, order, group, fitted, found)
+            if modes is None:
+                continue
             amplitudes = [fit_amplitudes(modes, target) for target in fitted]
-            if modes.order == 0 or any(_cancels(a, source) for a, source in zip(amplitudes, group, strict=True)):
+            if any(_cancels(a, source) for a, source in zip(amplitudes, group, strict=True)):
                 continue
             found = modes
             missed = [target.error(modes, a) for target, a in zip(unseen, amplitudes, strict=True)]
@@ -240,13 +242,16 @@ def _cancels(amplitudes: Array, source: Source) -> bool:
 
 def _best_modes(
     method: str, order: int, group: Sequence[Source], targets: Sequence[Target], smaller: Modes | None
-) -> Modes:
-    """Modes of least error: of all starts the two best after a few steps, refined to the end."""
+) -> Modes | None:
+    """Modes of least error: of all starts the two best after a few steps, refined to the end; None without a start."""
 
     def error(modes: Modes) -> float:
         return joint_error(modes, targets)
 
-    starts = [clipped(start, targets) for start in _starts(method, order, group, "fitted", smaller)]
+    found = _starts(method, order, group, "fitted", smaller)
+    starts = [clipped(start, targets) for start in found if start.order > 0]
+    if not starts:
+        return None
     if method in _DIRECT:
         return min(starts, key=error)
     race = sorted((refine(start, targets, evaluations=_RACE) for start in starts), key=error)
@@ -256,7 +261,7 @@ def _best_modes(
 def _starts(method: str, order: int, group: Sequence[Source], part: Part, smaller: Modes | None) -> list[Modes]:
     """Where to look for poles: from the data, and from the next smaller set with one mode added."""
     settled = max(source.slowest for source in group)
-    if method == "exponential":
+    if method == "exponential" or all(source.quasi_steady for source in group):  # without lag there is no pole to find
         no_pairs = np.zeros((0, 2))
         starts = [Modes(np.geomspace(1.0 / settled, fast / settled, order), no_pairs) for fast in (10.0, 100.0)]
     else:

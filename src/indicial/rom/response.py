@@ -58,8 +58,10 @@ class StepResponse:
         s, values = np.asarray(self.s, dtype=float), np.asarray(self.values, dtype=float)
         if self.input not in INPUTS:
             raise InputError(f"step response to {self.input!r}: inputs are {', '.join(INPUTS)}")
-        if s.ndim != 1 or s.size < 2 or np.any(np.diff(s) <= 0.0):
+        if s.ndim != 1 or s.size < 2 or not np.all(np.diff(s) > 0.0) or not np.isfinite(s[-1]):
             raise InputError(f"step response to {self.input}: reduced time must increase strictly, two samples or more")
+        if values.ndim != 2:
+            raise InputError(f"step response to {self.input}: values must be of shape ({s.size}, n_outputs)")
         if s[0] != 0.0:
             raise InputError(
                 f"step response to {self.input} starts at s = {s[0]:g}: it must start at 0, "

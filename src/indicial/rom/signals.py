@@ -69,12 +69,30 @@ class MotionInputs:
         Inputs before the first sample, shape (n_inputs,); a difference from ``values[0]`` is a jump at ``s[0]``.
     stride : int
         Loads are wanted at every `stride`-th sample, from the first.
+
+    Raises
+    ------
+    InputError
+        If times do not increase, shapes do not fit, or a value is not finite.
     """
 
     s: Array
     values: Array
     before: Array
     stride: int = 1
+
+    def __post_init__(self) -> None:
+        s, values, before = (np.asarray(part, dtype=float) for part in (self.s, self.values, self.before))
+        if s.ndim != 1 or s.size < 1 or not np.all(np.diff(s) > 0.0) or not np.all(np.isfinite(s)):
+            raise InputError("reduced times of inputs must be one-dimensional, finite and strictly increasing")
+        if values.ndim != 2 or len(values) != s.size or before.shape != values.shape[1:]:
+            raise InputError(
+                f"inputs of shape {values.shape}, before the first sample {before.shape}, do not fit {s.size} samples"
+            )
+        if not (np.all(np.isfinite(values)) and np.all(np.isfinite(before))):
+            raise InputError("inputs hold values that are not finite")
+        for name, array in (("s", s), ("values", values), ("before", before)):
+            object.__setattr__(self, name, array)
 
     @classmethod
     def from_history(
@@ -133,7 +151,7 @@ class MotionInputs:
     ) -> Self:
         """The inputs of `motion` at `times` [s], each interval sampled at `substeps` instants more closely."""
         t = np.asarray(times, dtype=float)
-        if t.ndim != 1 or t.size < 1 or t[0] != 0.0 or np.any(np.diff(t) <= 0.0):
+        if t.ndim != 1 or t.size < 1 or t[0] != 0.0 or not np.all(np.diff(t) > 0.0):
             raise InputError("times must be one-dimensional, start at 0 (that is 0+) and strictly increase")
         fine = _refined(t, substeps)
         inputs = _inputs(motion.velocity(fine), motion.rate(fine), speed, condition, reference)

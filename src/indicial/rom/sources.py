@@ -56,6 +56,11 @@ class Source(ABC):
     def slowest(self) -> float:
         """Reduced time after which nothing happens any more, as far as the data show."""
 
+    @property
+    @abstractmethod
+    def quasi_steady(self) -> bool:
+        """Whether every output answers at once, without any lag."""
+
     @abstractmethod
     def target(self, part: Part, match_integral: bool) -> Target:
         """What modes are to match; initial value and integral are those of all samples."""
@@ -95,6 +100,10 @@ class StepSource(Source):
     @property
     def slowest(self) -> float:
         return settling_time(self.response.s, self.response.deficiency)
+
+    @property
+    def quasi_steady(self) -> bool:
+        return not np.any(self.response.deficiency)
 
     def target(self, part: Part, match_integral: bool) -> TimeTarget:
         r, kept = self.response, self._kept(part)
@@ -194,6 +203,10 @@ class FrequencySource(Source):
     @property
     def slowest(self) -> float:
         return 1.0 / float(self.k[0])
+
+    @property
+    def quasi_steady(self) -> bool:
+        return not np.any(self.values - self.static)
 
     def target(self, part: Part, match_integral: bool) -> FrequencyTarget:
         kept = self._kept(part)

@@ -3,6 +3,8 @@ r"""State-space model of unsteady loads in reduced time."""
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -263,7 +265,7 @@ class StateSpaceModel(ReducedModel):
         Raises
         ------
         InputError
-            If the file is missing or holds something else.
+            If the file is missing, damaged or holds something else.
         """
         try:
             values = json.loads(Path(path).read_text(encoding="utf-8"))
@@ -272,7 +274,8 @@ class StateSpaceModel(ReducedModel):
         known = isinstance(values, dict) and values.get("format") == FORMAT
         if not known or values.get("schema_version") != SCHEMA_VERSION:
             raise InputError(f"{path}: not an {FORMAT} of schema version {SCHEMA_VERSION}")
-        return cls.from_dict(values)
+        with _of_file(path):
+            return cls.from_dict(values)
 
     def to_dataset(self) -> xarray.Dataset:
         """The model as an `xarray.Dataset` with matrices A, B, C, D."""
@@ -295,10 +298,17 @@ class StateSpaceModel(ReducedModel):
 
     @classmethod
     def from_netcdf(cls, path: str | Path) -> Self:
-        """Read a file of `to_netcdf`."""
+        """Read a file of `to_netcdf`.
+
+        Raises
+        ------
+        InputError
+            If the file is missing, damaged or holds something else.
+        """
         data = read_netcdf(path, FORMAT, SCHEMA_VERSION)
-        matrices = {name.lower(): data[name].values for name in ("A", "B", "C", "D", "baseline")}
-        return cls.from_dict({**matrices, **json.loads(data.attrs["description"])})
+        with _of_file(path):
+            matrices = {name.lower(): data[name].values for name in ("A", "B", "C", "D", "baseline")}
+            return cls.from_dict({**matrices, **json.loads(data.attrs["description"])})
 
     def summary(self) -> str:
         """Order, poles, fit of each channel, and the realisations that were compared."""
@@ -343,3 +353,16 @@ class StateSpaceModel(ReducedModel):
 
 def _pole_text(pole: complex) -> str:
     return f"{pole.real:.4g}" if pole.imag == 0.0 else f"{pole.real:.4g} +- {pole.imag:.4g}i"
+
+
+@contextmanager
+def _of_file(path: str | Path) -> Iterator[None]:
+    """Say of which file it is that what it holds is no model."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    except KeyError as error:
+        raise InputError(f"{path}: damaged, a part is missing ({error.args[0]})") from error
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{path}: damaged ({error})") from error

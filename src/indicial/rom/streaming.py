@@ -85,8 +85,17 @@ def advance(stream: Stream, inputs: Array, ds: float, loads: Array) -> None:
         The step in reduced time: ``2V dt/c``, with the mean V where it varies. Equal steps are cheaper.
     loads : ndarray
         Filled with the coefficients at the end of the step, baseline included, shape (n_outputs,).
+
+    Raises
+    ------
+    InputError
+        If inputs or loads are not as many as the model's, or the step is negative.
     """
     poles, b, c, d, baseline, last, state, factors, step = stream
+    if inputs.size != last.size or loads.size != baseline.size:  # compiled code would read what lies beyond
+        raise InputError("a step needs as many inputs, and room for as many loads, as the model has")
+    if not ds >= 0.0:
+        raise InputError("a step in reduced time must not be negative")
     if ds != step[0]:
         step[0] = ds
         for i in range(poles.size):

@@ -19,6 +19,14 @@ from indicial.rom.state_space import StateSpaceModel
 
 _SERIES, _TERMS = 0.02, 7  # as in `recurrence.hold_factors`
 
+_KEYWORD = re.compile(
+    "asm|auto|bool|break|case|catch|char|class|const|continue|default|delete|do|double|else|enum|explicit|export|extern|"
+    "false|float|for|friend|goto|if|inline|int|long|mutable|namespace|new|operator|private|protected|public|register|"
+    "restrict|return|short|signed|sizeof|static|struct|switch|template|this|throw|true|try|typedef|typename|union|"
+    "unsigned|using|virtual|void|volatile|wchar_t|while|casadi_int|casadi_real"
+)
+"""Words of C and C++ (the header is for both) that a struct cannot be called."""
+
 
 def export_c(model: StateSpaceModel, path: Path) -> tuple[Path, ...]:
     """``NAME.c`` and ``NAME.h``; the functions are called NAME_settle, NAME_step and NAME_loads.
@@ -29,8 +37,10 @@ def export_c(model: StateSpaceModel, path: Path) -> tuple[Path, ...]:
         If the file's name is no name in C, or the model has no modal form.
     """
     name = path.stem
-    if not re.fullmatch(r"[A-Za-z]\w*", name, flags=re.ASCII):
-        raise InputError(f"{path}: its functions are called after the file, whose name must be letters, digits and _")
+    if not re.fullmatch(r"[A-Za-z]\w*", name, flags=re.ASCII) or _KEYWORD.fullmatch(name):
+        raise InputError(
+            f"{path}: its functions are called after the file, whose name must be letters, digits and _, no word of C"
+        )
     header, source = c_texts(Portable.of(model), name)
     beside = path.with_suffix(".h")
     write_text(path, source)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -26,7 +27,7 @@ from indicial.rom.export.portable import MEANING, Portable
 from indicial.rom.state_space import StateSpaceModel
 
 MODEL = "indicial_model"
-"""Model identifier, and name of its C functions."""
+"""Model identifier, and name of its sources."""
 
 _FOLDERS = {"linux": ("linux64", ".so"), "darwin": ("darwin64", ".dylib")}
 
@@ -51,6 +52,7 @@ def export_fmu(model: StateSpaceModel, path: Path, *, sources_only: bool = False
     digest = hashlib.sha256("".join(sources.values()).encode()).hexdigest()
     guid = f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
     sources["fmi2.c"] = sources["fmi2.c"].replace("@guid@", guid)
+    sources = {name: _own_names(text, digest[:16]) for name, text in sources.items()}
     with atomic_path(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("modelDescription.xml", _description(portable, guid))
         archive.writestr("documentation/README.txt", "\n".join(portable.notes()) + "\n")
@@ -59,6 +61,13 @@ def export_fmu(model: StateSpaceModel, path: Path, *, sources_only: bool = False
         if not sources_only:
             archive.writestr(*_compiled(sources))
     return (path,)
+
+
+def _own_names(text: str, digest: str) -> str:
+    """Functions under names of this model alone: a program may load many such libraries into one space of names."""
+    for name in (MODEL, MODEL.upper()):
+        text = re.sub(rf"\b{name}(?!\.)", f"{name}_{digest}", text)  # but for the names of files
+    return text
 
 
 def _fmi2(portable: Portable) -> str:

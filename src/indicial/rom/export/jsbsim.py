@@ -20,18 +20,13 @@ from indicial.conventions import COEFFICIENTS, Array
 from indicial.errors import InputError
 from indicial.files import write_text
 from indicial.rom.export.portable import MEANING, Portable
+from indicial.rom.signals import ANGLES
 from indicial.rom.state_space import StateSpaceModel
 
 FOOT = 0.3048
 """[m]"""
 
-_MOTION = {
-    "alpha": "aero/alpha-rad",
-    "beta": "aero/beta-rad",
-    "p": "velocities/p-aero-rad_sec",
-    "q": "velocities/q-aero-rad_sec",
-    "r": "velocities/r-aero-rad_sec",
-}
+_RATES = {name: f"<p>velocities/{name}-aero-rad_sec</p>" for name in "pqr"}
 _AXES = {"CA": "AXIAL", "CY": "SIDE", "CN": "NORMAL", "Cl": "ROLL", "Cm": "PITCH", "Cn": "YAW"}
 
 _SPEED = "<max><p>velocities/vt-fps</p><v>1</v></max>"  # JSBSim begins at rest before it has its initial conditions
@@ -105,7 +100,7 @@ def _aerodynamics(portable: Portable, memory: str, curves: dict[str, Array]) -> 
         if name in curves:
             m = portable.model.inputs.index("alpha")
             direct[m] = np.real(np.sum(modes.c[j] * modes.b[:, m] / modes.poles))  # D - H(0)
-            terms = [_table(_MOTION["alpha"], curves[name])]
+            terms = [_table("indicial/now-alpha", curves[name])]
         terms += [_product(_v(gain), _p(f"now-{m}")) for m, gain in enumerate(direct) if gain]
         for i, weight in enumerate(modes.c[j]):
             if weight:
@@ -120,6 +115,7 @@ def _aerodynamics(portable: Portable, memory: str, curves: dict[str, Array]) -> 
         *portable.notes(),
         f'Needs <system file="{memory}"/> in the same aircraft. Reference area and lengths are those above, whatever',
         "<metrics> says; its AERORP must be the moment reference point (structural axes: x aft, y right, z up).",
+        "The flow angles are made for that point, wherever the centre of gravity is.",
         "A step is exact for motions that are linear over it. Choose simulation/dt so that they are: a frame must be",
         "short against the motion, not against the lag.",
     ]
@@ -175,16 +171,33 @@ def _mode(portable: Portable, i: int, pole: complex, real: bool) -> list[str]:
 
 def _inputs(portable: Portable, when: str, kind: str) -> list[str]:
     """Lines that make the model's inputs of JSBSim's motion."""
-    lines = []
+    lines = _angles(when, kind) if set(ANGLES) & set(portable.model.inputs) else []
     for m, name in enumerate(portable.model.inputs):
-        motion = f"<p>{_MOTION[name]}</p>"
-        if portable.lengths[m]:
-            over = f"<quotient>{_v(0.5 * portable.lengths[m] / FOOT)}{_SPEED}</quotient>"
-            made = _product(motion, over)
+        if name in ANGLES:
+            made = _difference(_p(f"{when}-{name}"), _v(portable.offsets[m]))
         else:
-            made = _difference(motion, _v(portable.offsets[m]))
+            over = f"<quotient>{_v(0.5 * portable.lengths[m] / FOOT)}{_SPEED}</quotient>"
+            made = _product(_RATES[name], over)
         lines += _define(kind, f"{when}-{m}", made, f"{name} of the model")
     return lines
+
+
+def _angles(when: str, kind: str) -> list[str]:
+    """Lines for the flow angles at AERORP: JSBSim's own are those of the centre of gravity."""
+    lines = []
+    for axis, ahead in zip("xyz", (-1.0, 1.0, -1.0), strict=True):  # structural axes to body axes, in to ft
+        arm = _difference(f"<p>metrics/aero-rp-{axis}-in</p>", f"<p>inertia/cg-{axis}-in</p>")
+        lines += _define(kind, f"{when}-arm-{axis}", _product(arm, _v(ahead / 12.0)))
+    x, y, z = (_p(f"{when}-arm-{axis}") for axis in "xyz")
+    p, q, r = (_RATES[name] for name in "pqr")
+    turning = {"u": (q, z, r, y), "v": (r, x, p, z), "w": (p, y, q, x)}
+    for name, (a, b, c, d) in turning.items():
+        speed = _sum(f"<p>velocities/{name}-aero-fps</p>", _difference(_product(a, b), _product(c, d)))
+        lines += _define(kind, f"{when}-{name}", speed)
+    u, v, w = (_p(f"{when}-{name}") for name in "uvw")
+    across = f"<pow>{_sum(_product(u, u), _product(w, w))}{_v(0.5)}</pow>"
+    lines += _define(kind, f"{when}-alpha", f"<atan2>{w}{u}</atan2>", "at the moment reference point")
+    return lines + _define(kind, f"{when}-beta", f"<atan2>{v}{across}</atan2>", "at the moment reference point")
 
 
 def _driven(portable: Portable, i: int, when: str) -> _Complex:
