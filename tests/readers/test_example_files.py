@@ -84,7 +84,7 @@ def test_one_command_from_report_files_to_derivatives_model_and_plots(tmp_path):
     for name, exact in {"CN_alphadot": 2.0 * cl_ad, "Cm_alphadot": 2.0 * cm_ad}.items():
         # the error bar that the tail and the samples give holds the truth
         assert abs(found[name]["value"] - exact) < 2.0 * found[name]["uncertainty"] < 0.02 * abs(exact)
-    for figure in ("model", "quasi_steady", "check_1_pitch_oscillation"):
+    for figure in ("model", "record_length", "quasi_steady", "check_1_pitch_oscillation"):
         assert (tmp_path / "built" / f"{figure}.png").stat().st_size > 5000
     model = StateSpaceModel.from_json(tmp_path / "built" / "model.json")
     assert model.inputs == ("alpha", "q")

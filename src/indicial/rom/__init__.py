@@ -12,6 +12,7 @@ from indicial.rom.nonlinear import NonlinearModel, nonlinear_model
 from indicial.rom.projection import HeldOut, OrderTrial, Projection, project
 from indicial.rom.quasi_steady import QuasiSteadyError, QuasiSteadyModel, quasi_steady_error
 from indicial.rom.realisation import realise
+from indicial.rom.record_length import RecordLength, record_length
 from indicial.rom.response import StepResponse, StepResponses
 from indicial.rom.schedule import LeftOut, ScheduledModel, best_schedule, leave_one_out, schedule
 from indicial.rom.state_space import Candidate, ChannelError, StateSpaceModel
@@ -36,6 +37,7 @@ __all__ = [
     "Projection",
     "QuasiSteadyError",
     "QuasiSteadyModel",
+    "RecordLength",
     "ReducedModel",
     "ScheduledModel",
     "StateSpaceModel",
@@ -57,6 +59,7 @@ __all__ = [
     "project",
     "quasi_steady_error",
     "realise",
+    "record_length",
     "refine_model",
     "schedule",
     "stream",

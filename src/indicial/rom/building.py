@@ -22,6 +22,7 @@ from indicial.rom.era import settling_time
 from indicial.rom.identification import identify
 from indicial.rom.quasi_steady import QuasiSteadyError, QuasiSteadyModel, quasi_steady_error
 from indicial.rom.realisation import realise
+from indicial.rom.record_length import record_length
 from indicial.rom.response import StepResponses
 from indicial.rom.signals import ANGLES, STEP_KINDS
 from indicial.rom.state_space import StateSpaceModel
@@ -79,8 +80,10 @@ class BuiltModel:
         return "\n\n".join(parts)
 
     def figures(self) -> dict[str, Figure]:
-        """Figures by name: step responses, quasi-steady limits, predictions, comparison."""
+        """Figures by name: step responses, cost of shorter records, quasi-steady limits, predictions, comparison."""
         found = {"model": self.model.plot(self.responses)}
+        if self.integrals:
+            found["record_length"] = self._draw_record_length()
         if self.quasi_steady is not None:
             found["quasi_steady"] = self.quasi_steady.plot()
         for i, check in enumerate(self.checks):
@@ -88,6 +91,22 @@ class BuiltModel:
         if self.comparison is not None:
             found["comparison"] = self.comparison.plot()
         return found
+
+    def _draw_record_length(self) -> Figure:
+        """What shorter records would have given for the derivatives of Eq. (17)."""
+        import matplotlib.pyplot as plt
+
+        assert self.responses is not None
+        assert self.integrals is not None
+        figure, axes = plt.subplots(1, len(self.integrals), squeeze=False, layout="constrained")
+        figure.set_size_inches(5.0 * len(self.integrals), 3.6)
+        for ax, name in zip(axes[0], self.integrals, strict=True):
+            output, _, input_ = name.removesuffix("dot").partition("_")
+            s, values = self.responses.channel(output, input_)
+            final = self.responses[input_].final
+            known = None if final is None else float(final[self.responses.outputs.index(output)])
+            record_length(s, values, known, name=name).plot(ax)
+        return figure
 
     def write(self, folder: str | Path) -> tuple[Path, ...]:
         """Model (JSON, netCDF), step responses, derivatives, summary and figures (PNG), into a folder."""

@@ -6,8 +6,8 @@ r"""Nonlinear indicial model: a static curve, and step responses that change wit
 with the deficiency functions of small steps about each angle (Tobak and Schiff, NASA TR R-454, 1976). With lags common
 to all angles, ``F_a(s; alpha) = sum_i a_i(alpha) exp(-p_i s)``, the integrals are linear lags of static curves
 ``G_i(alpha) = integral a_i dalpha`` and ``a_qi(alpha) q``: the model is stable whatever the motion, gives the static
-curve exactly when the motion is slow, and is the linear model where nothing depends on the angle. It knows no history of
-the angle beyond its lags: where a flow has two states at one angle (static hysteresis) it does not hold.
+curve exactly when the motion is slow, and is the linear model where nothing depends on the angle. It knows no history
+of the angle beyond its lags: where a flow has two states at one angle (static hysteresis) it does not hold.
 """
 
 from __future__ import annotations
