@@ -8,6 +8,7 @@ from indicial.cfd.lattice.polars import NeuralFoil, Polar, PolarSource, PolarTab
 from indicial.cfd.lattice.section_solver import (
     ExtrapolationWarning,
     SectionLatticeSolver,
+    SectionMarch,
     SectionSettings,
     StripRecord,
 )
@@ -33,6 +34,7 @@ __all__ = [
     "PolarTables",
     "RigidMotion",
     "SectionLatticeSolver",
+    "SectionMarch",
     "SectionSettings",
     "SeparationLag",
     "SteadyStrips",

@@ -17,6 +17,7 @@ added mass) the lattice keeps its own, and the section sees none.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -27,7 +28,9 @@ from indicial.conventions import Array
 from indicial.errors import DivergenceError
 
 _ITERATIONS = 60
-_TOLERANCE = 1e-11
+TOLERANCE = 1e-11
+"""Of the circulation, relative to that of a section of unit lift."""
+
 _SMALLEST_STEP = 1e-6
 
 
@@ -76,6 +79,11 @@ class StripProblem:
             self.size,
         )
 
+    @cached_property
+    def inner(self) -> Array:
+        """``I - R/(2 pi g)``: what Gamma is of ``Gamma_0 - R v``, shape (S, S)."""
+        return np.eye(self.size.size) - self.response / (2.0 * np.pi * self.size)
+
     def incidence(self, across: Array) -> Array:
         """alpha of the strips (S,) [rad] with the wind v across their chords (S,) [m/s]."""
         return np.arctan2(across, self.along)
@@ -91,7 +99,9 @@ class StripProblem:
         cl, slope = sections.polar_lift(alpha) if point is None else sections.lift(alpha, point)
         return self.size * speed * cl, self.size * (across / speed * cl + self.along / speed * slope)
 
-    def solve(self, sections: StripSections, across: Array, point: Array | None) -> tuple[Array, Array]:
+    def solve(
+        self, sections: StripSections, across: Array, point: Array | None, tolerance: float = TOLERANCE
+    ) -> tuple[Array, Array]:
         """v and Gamma (S,) for fixed separation points, or static ones; from a guess of v.
 
         Raises
@@ -99,7 +109,7 @@ class StripProblem:
         DivergenceError
             If Newton's method stalls.
         """
-        inner = np.eye(across.size) - self.response / (2.0 * np.pi * self.size)
+        inner = self.inner
 
         def residual(v: Array) -> tuple[Array, Array, Array]:
             gamma, slope = self.circulation(sections, v, point)
@@ -110,7 +120,7 @@ class StripProblem:
         scale = float(np.max(self.size * np.hypot(self.along, v))) + 1e-300
         for _ in range(_ITERATIONS):
             size = float(np.max(np.abs(off)))
-            if size <= _TOLERANCE * scale:
+            if size <= tolerance * scale:
                 return v, gamma
             try:
                 step = np.linalg.solve(inner * slope + self.response, -off)
@@ -127,7 +137,7 @@ class StripProblem:
             v = v + part * step
             off, gamma, slope = trial
         # what round-off leaves is no failure
-        if float(np.max(np.abs(off))) <= 1e3 * _TOLERANCE * scale:
+        if float(np.max(np.abs(off))) <= 1e3 * TOLERANCE * scale:
             return v, gamma
         raise DivergenceError(f"section lift and lattice do not meet: residual {np.max(np.abs(off)) / scale:.1e}")
 

@@ -28,8 +28,11 @@ from indicial.solver import SteadyLoads
 VISCOSITY = 1.458e-6
 """Sutherland's constant of air [kg/(m s sqrt(K))]."""
 
-SUBSTEP = 0.25
+SUBSTEP = 1.0
 """Largest step of the separation points, in the shorter of their time constants."""
+
+
+_SUBSTEP_TOLERANCE = 1e-7
 
 
 class ExtrapolationWarning(UserWarning):
@@ -225,7 +228,7 @@ class SectionLatticeSolver:
         t = np.asarray(times, dtype=float)
         if t.ndim != 1 or t.size < 1 or t[0] != 0.0 or np.any(np.diff(t) <= 0.0) or not np.all(np.isfinite(t)):
             raise InputError("times must be finite, start at 0 and increase")
-        run = _SectionMarch(self, condition, motion)
+        run = SectionMarch(self, condition, motion)
         velocity, rate = motion.velocity(t), motion.rate(t)
         loads = np.array([run.step(float(t[n]), velocity[n], rate[n]) for n in range(t.size)])
         if t.size > 1:
@@ -288,8 +291,8 @@ class SectionLatticeSolver:
         }
 
 
-class _SectionMarch:
-    """One motion: wake, circulation and separation points in step."""
+class SectionMarch:
+    """One motion: wake, circulation and separation points in step; `step` by `step`, whatever decides the next."""
 
     def __init__(self, solver: SectionLatticeSolver, condition: FlightCondition, motion: Motion) -> None:
         self._solver, self._condition = solver, condition
@@ -342,7 +345,7 @@ class _SectionMarch:
         for n in range(1, count + 1):
             # the incidence midway decides
             middle = self._problem.between(problem, (n - 0.5) / count)
-            self._across, _ = middle.solve(self._sections, self._across, self.state.point)
+            self._across, _ = middle.solve(self._sections, self._across, self.state.point, _SUBSTEP_TOLERANCE)
             alpha = middle.incidence(self._across)
             self.state = self._sections.advance(self.state, alpha, travelled / count, lag)
         self._across, gamma = problem.solve(self._sections, self._across, self.state.point)

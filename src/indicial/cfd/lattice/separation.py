@@ -108,8 +108,8 @@ class StripSections:
         n = np.clip(place.astype(int), 0, GRID.size - 2)
         w = place - n
         strips = np.arange(alpha.size)
-        part = self.tables[list(rows)]
-        f0, f1, d0, d1 = (part[:, kind, n + k, strips] for kind in (0, 1) for k in (0, 1))
+        which = np.array(rows)[:, None]
+        f0, f1, d0, d1 = (self.tables[which, kind, n + k, strips] for kind in (0, 1) for k in (0, 1))
         rise = f1 - f0
         value = f0 + w * (step * d0 + w * (3.0 * rise - step * (2.0 * d0 + d1) + w * (step * (d0 + d1) - 2.0 * rise)))
         slope = d0 + w * (2.0 * (3.0 * rise / step - 2.0 * d0 - d1) + 3.0 * w * (d0 + d1 - 2.0 * rise / step))

@@ -22,6 +22,7 @@ from indicial.errors import DivergenceError
 _RELAXATION = 0.3
 _ITERATIONS = 3000
 _SETTLED = 1e-9
+_NEAR = 1e-3
 _ALIKE = 1e-4
 
 
@@ -73,25 +74,42 @@ def settle(
         If they come to none.
     """
     across = problem.free / (2.0 * np.pi * problem.size)
-    x = point
+    x, next_try = point, _NEAR
     count = 0
     while True:
         count += 1
         across, circulation = problem.solve(sections, across, x)
         goal, _ = sections.static(problem.incidence(across))
         change = goal - x
-        if float(np.max(np.abs(change))) < _SETTLED:
-            break
+        size = float(np.max(np.abs(change)))
+        if size < next_try:
+            # near enough for Newton's method? it must not jump to another state
+            found = _polished(problem, sections, across, x, 10.0 * size)
+            if found is not None or size < _SETTLED:
+                break
+            next_try *= 0.1
         x = x + _RELAXATION * change
         if count == _ITERATIONS:
             worst = float(np.max(np.abs(change)))
             raise DivergenceError(
                 f"no steady state from the start {start!r}: separation points still move by {worst:.1e}"
             )
-    across, circulation = problem.solve(sections, across, None)
+    across, circulation = found or problem.solve(sections, across, None)
     alpha = problem.incidence(across)
     point, _ = sections.static(alpha)
     return SteadyStrips(start, across, circulation, alpha, point, growth(problem, sections, across, point, lag), count)
+
+
+def _polished(
+    problem: StripProblem, sections: StripSections, across: Array, point: Array, within: float
+) -> tuple[Array, Array] | None:
+    """v and Gamma of the static lifts; None if separation points are not within so much of those given."""
+    try:
+        v, circulation = problem.solve(sections, across, None)
+    except DivergenceError:
+        return None
+    moved = sections.static(problem.incidence(v))[0] - point
+    return (v, circulation) if float(np.max(np.abs(moved))) <= within else None
 
 
 def growth(problem: StripProblem, sections: StripSections, across: Array, point: Array, lag: SeparationLag) -> float:
@@ -99,7 +117,7 @@ def growth(problem: StripProblem, sections: StripSections, across: Array, point:
     alpha = problem.incidence(across)
     speed = np.hypot(problem.along, across)
     _, slope = problem.circulation(sections, across, point)
-    inner = np.eye(across.size) - problem.response / (2.0 * np.pi * problem.size)
+    inner = problem.inner
     pushed = inner * (problem.size * speed * sections.lift_of_point(alpha, point))
     moved = -np.linalg.solve(inner * slope + problem.response, pushed)
     turned = (problem.along / speed**2)[:, None] * moved
