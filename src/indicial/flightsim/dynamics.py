@@ -19,6 +19,7 @@ mass matrix and nothing is lagged.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -31,6 +32,7 @@ from indicial.conventions import Array
 from indicial.errors import InputError
 from indicial.flightsim.aerodynamics import Aerodynamics, FlowState
 from indicial.flightsim.atmosphere import Air, Atmosphere, ConstantAtmosphere
+from indicial.flightsim.compiled import Kernel, compile_function
 from indicial.flightsim.earth import Earth, FlatEarth
 from indicial.flightsim.initial import InitialState
 from indicial.flightsim.vehicle import Vehicle
@@ -52,12 +54,14 @@ class Dynamics:
     vehicle, aerodynamics, atmosphere, earth
         What the model is made of.
     derivative : casadi.Function
-        (state, parameters) -> time derivative of the state.
+        (state, parameters, time [s]) -> time derivative of the state.
     loads : casadi.Function
-        (state, parameters) -> (force [N], moment about the centre of gravity [N m], density [kg/m^3], speed of sound
-        [m/s]), body axes.
+        (state, parameters, time) -> (force [N], moment about the centre of gravity [N m], density [kg/m^3], speed of
+        sound [m/s]), body axes.
     altitude : casadi.Function
         state -> geometric altitude [m].
+    monitor : casadi.Function
+        (state, parameters, time) -> what ends are asked of: x [m], altitude [m], climb rate [m/s].
     state_names, parameter_names : tuple of str
         Parameters are the free symbols of the aerodynamic model, in its order.
     """
@@ -69,8 +73,38 @@ class Dynamics:
     derivative: Any
     loads: Any
     altitude: Any
+    monitor: Any
     state_names: tuple[str, ...]
     parameter_names: tuple[str, ...]
+
+    @functools.cached_property
+    def time_dependent(self) -> bool:
+        """Whether the equations hold time itself: controls, gusts, burning propellant."""
+        return bool(self.derivative.jac_sparsity(0, 2).nnz() > 0)
+
+    @functools.cached_property
+    def rate_kernel(self) -> Kernel:
+        """`derivative` as machine code."""
+        return compile_function(self.derivative)
+
+    @functools.cached_property
+    def monitor_kernel(self) -> Kernel:
+        """`monitor` as machine code."""
+        return compile_function(self.monitor)
+
+    @functools.cached_property
+    def _jacobian(self) -> Any:
+        return self.derivative.jacobian()
+
+    def jacobian(self, state: ArrayLike, parameters: ArrayLike = (), time: float = 0.0) -> Array:
+        """Exact derivative of the rate of change with respect to the state, shape (nx, nx)."""
+        matrix: Array = np.array(self._jacobian(state, parameters, time, 0)[0])
+        return matrix
+
+    def rate(self, state: ArrayLike, parameters: ArrayLike = (), time: float = 0.0) -> Array:
+        """Time derivative of a state, shape (nx,)."""
+        change: Array = np.array(self.derivative(state, parameters, time)).ravel()
+        return change
 
     @property
     def lag_states(self) -> int:
@@ -108,19 +142,25 @@ class Dynamics:
             raise InputError(f"initial state has {lag.size} lag states, the aerodynamic model {self.lag_states}")
         state = np.concatenate([initial.position, initial.velocity, initial.quaternion, initial.rate, lag])
         if initial.lag is None and self.lag_states and np.any(initial.velocity):
-            jacobian = np.array(self.derivative.jacobian()(state, parameters, 0)[0])[13:, 13:]
-            forcing = np.array(self.derivative(state, parameters)).ravel()[13:]
-            state[13:] = -np.linalg.solve(jacobian, forcing)
+            jacobian, forcing = self.jacobian(state, parameters), self.rate(state, parameters)
+            state[13:] = -np.linalg.solve(jacobian[13:, 13:], forcing[13:])
         return state
 
     def step(self) -> Any:
-        """Classical fourth-order Runge-Kutta step: casadi.Function (state, parameters, step [s]) -> state."""
+        """Classical fourth-order Runge-Kutta step: casadi.Function (state, parameters, step [s]) -> state.
+
+        Raises
+        ------
+        InputError
+            If the equations hold time itself.
+        """
+        self._without_time("a step in CasADi")
         state, parameters = (
             ca.SX.sym("state", len(self.state_names)),
             ca.SX.sym("parameters", len(self.parameter_names)),
         )
         length = ca.SX.sym("step")
-        after = _runge_kutta(lambda y: self.derivative(y, parameters), state, length)
+        after = _runge_kutta(lambda y: self.derivative(y, parameters, 0.0), state, length)
         return ca.Function("step", [state, parameters, length], [after], ["state", "parameters", "step"], ["after"])
 
     def step_in_distance(self) -> Any:
@@ -133,7 +173,7 @@ class Dynamics:
         parameters, length = ca.SX.sym("parameters", len(self.parameter_names)), ca.SX.sym("step")
 
         def per_distance(y: Any) -> Any:
-            rate = self.derivative(y[:-1], parameters)
+            rate = self.derivative(y[:-1], parameters, y[-1])
             return ca.vertcat(rate, 1.0) / rate[0]
 
         after = _runge_kutta(per_distance, ca.vertcat(state, time), length)
@@ -150,7 +190,13 @@ class Dynamics:
         casadi.Function (state, parameters, spacing [s]) -> states at each instant (nx, n). Backward differentiation of
         order 1 to 5 with steps chosen by the relative `tolerance` (absolute: a hundredth of it) and the exact sparse
         Jacobian. Source: Hindmarsh et al., ACM Trans. Math. Softw. 31 (2005) 363.
+
+        Raises
+        ------
+        InputError
+            If the equations hold time itself.
         """
+        self._without_time("CVODES")
         state, parameters = (
             ca.SX.sym("state", len(self.state_names)),
             ca.SX.sym("parameters", len(self.parameter_names)),
@@ -158,7 +204,7 @@ class Dynamics:
         spacing = ca.SX.sym("spacing")
         # One instant to the next is one unit of its time, so that one integrator serves every spacing.
         values = ca.vertcat(parameters, spacing)
-        problem = {"x": state, "p": values, "ode": spacing * self.derivative(state, parameters)}
+        problem = {"x": state, "p": values, "ode": spacing * self.derivative(state, parameters, 0.0)}
         options = {
             "reltol": tolerance,
             "abstol": 0.01 * tolerance,
@@ -175,6 +221,10 @@ class Dynamics:
     def march_in_distance(self, steps: int) -> Any:
         """`step_in_distance` taken `steps` times; the last row of the result is time [s]."""
         return repeat(self.step_in_distance(), steps)
+
+    def _without_time(self, what: str) -> None:
+        if self.time_dependent:
+            raise InputError(f"{what} does not take a model that depends on time; 'rk4' and 'dop853' do")
 
 
 def repeat(step: Any, steps: int) -> Any:
@@ -224,6 +274,7 @@ def build_dynamics(
     position, velocity, quaternion, rate = state[POSITION], state[VELOCITY], state[QUATERNION], state[RATE]
     lag = state[len(RIGID_STATES) :]
     parameters = ca.vertcat(ca.SX(0, 1), *aerodynamics.parameters)
+    time = ca.SX.sym("time")
 
     rotation = _rotation(quaternion)
     altitude = earth.altitude(position)
@@ -249,7 +300,9 @@ def build_dynamics(
         aerodynamics.lag_rate(flow, lag),
     )
     derivative, force, moment = ca.substitute([derivative, force, moment], [turning], [solution])
-    inputs, names = [state, parameters], ["state", "parameters"]
+    inputs, names = [state, parameters, time], ["state", "parameters", "time"]
+    climb = ca.jtimes(altitude, position, ca.mtimes(rotation, velocity))
+    monitor = ca.densify(ca.vertcat(position[0], altitude, climb))
     outputs = [force, moment, flow.density, flow.speed_of_sound]
     return Dynamics(
         vehicle=vehicle,
@@ -259,6 +312,7 @@ def build_dynamics(
         derivative=ca.Function("derivative", inputs, [ca.densify(derivative)], names, ["derivative"]),
         loads=ca.Function("loads", inputs, [ca.densify(o) for o in outputs], names, ["force", "moment", "rho", "a"]),
         altitude=ca.Function("altitude", [state], [altitude], ["state"], ["altitude"]),
+        monitor=ca.Function("monitor", inputs, [monitor], names, ["monitored"]),
         state_names=(*RIGID_STATES, *aerodynamics.lag_names),
         parameter_names=tuple(symbol.name() for symbol in aerodynamics.parameters),
     )

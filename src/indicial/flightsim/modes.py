@@ -131,8 +131,7 @@ class Modes:
 def linearise(dynamics: Dynamics, state: Array, parameters: Mapping[str, float] | None = None) -> LinearModel:
     """The exact linear model about a state vector (`Dynamics.initial_vector`)."""
     values = dynamics.parameter_vector(parameters)
-    matrix = np.array(dynamics.derivative.jacobian()(state, values, 0)[0])
-    rate = np.array(dynamics.derivative(state, values)).ravel()
+    matrix, rate = dynamics.jacobian(state, values), dynamics.rate(state, values)
     return LinearModel(matrix, np.asarray(state, dtype=float), rate, dynamics.state_names)
 
 

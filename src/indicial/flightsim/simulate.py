@@ -1,10 +1,10 @@
-"""Flying a model: Runge-Kutta or, for fast lag states, CVODES inside CasADi; or SciPy's as a cross-check."""
+"""Flying a model: compiled Runge-Kutta, with fixed steps or with error control; CVODES for fast lag states."""
 
 from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
@@ -18,6 +18,7 @@ from indicial.flightsim.atmosphere import Atmosphere
 from indicial.flightsim.dynamics import POSITION, QUATERNION, RATE, VELOCITY, Dynamics, build_dynamics
 from indicial.flightsim.earth import Earth
 from indicial.flightsim.initial import InitialState
+from indicial.flightsim.march import NOT_FINITE, TOO_MANY_STEPS, adaptive, dop853, runge_kutta
 from indicial.flightsim.trajectory import Trajectory
 from indicial.flightsim.vehicle import Vehicle
 
@@ -28,10 +29,11 @@ Method = Literal["rk4", "cvodes", "dop853"]
 TOLERANCE = 1e-11
 """Relative tolerance of the adaptive methods."""
 
-_BLOCK = 2048  # steps marched at a time between looks at the end condition
-_STIFF_BLOCK = 128  # instants, likewise: far fewer, and nothing need be well behaved beyond the end
+_STIFF_BLOCK = 128  # instants CVODES marches between looks at the end: nothing need be well behaved beyond it
 _STIFF = 10  # steps an instant from which CVODES takes less time than Runge-Kutta
 _MAX_STEPS = 20_000_000
+_MAX_ADAPTIVE_STEPS = 400_000
+_LEAST_TOLERANCE = 1e-14  # that double precision can tell
 
 
 @dataclass(frozen=True)
@@ -44,19 +46,33 @@ class End:
         Downrange station [m], reached from below.
     altitude : float, optional
         Altitude [m], reached from above.
+    apogee : bool
+        Where the vehicle, climbing until then, begins to fall.
     """
 
     x: float | None = None
     altitude: float | None = None
+    apogee: bool = False
 
-    def margins(self, dynamics: Dynamics, states: Array) -> Array:
-        """What is left until each end [m], shape (n_ends, n), negative once passed; states are (n, nx)."""
-        left = []
+    @property
+    def rows(self) -> Array:
+        """(monitored quantity, sign, level) of each end, as `march` takes them, shape (n, 3)."""
+        rows = []
         if self.x is not None:
-            left.append(self.x - states[:, 0])
+            rows.append((0, -1.0, self.x))
         if self.altitude is not None:
-            left.append(np.array(dynamics.altitude(states.T)).ravel() - self.altitude)
-        return np.array(left).reshape(len(left), len(states))
+            rows.append((1, 1.0, self.altitude))
+        if self.apogee:
+            rows.append((2, 1.0, 0.0))
+        return np.array(rows, dtype=float).reshape(len(rows), 3)
+
+    def margins(self, dynamics: Dynamics, states: Array, parameters: Array) -> Array:
+        """What is left until each end [m, m, m/s], shape (n_ends, n), negative once passed; states are (n, nx)."""
+        values = np.tile(parameters[:, None], (1, len(states)))
+        seen = np.array(dynamics.monitor(states.T, values, 0.0))
+        rows = self.rows
+        margins: Array = rows[:, 1:2] * (seen[rows[:, 0].astype(int)] - rows[:, 2:3])
+        return margins
 
 
 def simulate(
@@ -91,6 +107,7 @@ def fly(
     method: Method | None = None,
     parameters: Mapping[str, float] | None = None,
     estimate_error: bool = True,
+    tolerance: float = TOLERANCE,
 ) -> Trajectory:
     """Fly a model from an initial state.
 
@@ -107,14 +124,17 @@ def fly(
         `suggest_step`. The other methods keep instants as far apart ("cvodes" evenly spaced, no farther).
     end : End, optional
     method : {"rk4", "cvodes", "dop853"}, optional
-        Fixed-step Runge-Kutta of fourth order, marched inside CasADi; CVODES there, at a tolerance of `TOLERANCE`,
-        for lag states far faster than the motion; or SciPy's adaptive DOP853 at that tolerance, much slower, as a
-        second implementation. If not given, "rk4" if `step` is, else by `suggest_method`.
+        Fixed-step Runge-Kutta of fourth order, compiled; CVODES in CasADi, for lag states far faster than the
+        motion; or compiled DOP853, of order 8, whose steps follow the error. If not given, "rk4" if `step` is, else
+        by `suggest_method`.
+    tolerance : float
+        Relative, of the adaptive methods; the absolute one is a hundredth of it (times the state's size at the start,
+        where that is larger than 1).
     parameters : mapping, optional
         Values of the model's free symbols.
     estimate_error : bool
         Fly again and record the error of the flight returned in the provenance: "rk4" with half the step, 16/15 of
-        the difference; "cvodes" with a hundredth of the tolerance, the difference.
+        the difference; the others with a hundredth of the tolerance, the difference.
 
     Raises
     ------
@@ -141,16 +161,15 @@ def fly(
     if not (math.isfinite(step) and 0.0 < step <= duration) or duration / step > _MAX_STEPS:
         raise InputError(f"step is {step} s, must be at most the duration and no less than 1/{_MAX_STEPS} of it")
     end = End() if end is None else end
-    if end.margins(dynamics, start[None, :]).min(initial=math.inf) <= 0.0:
+    if end.margins(dynamics, start[None, :], values).min(initial=math.inf) < 0.0:
         raise InputError("the flight starts beyond its end")
     flight = _Flight(dynamics, start, values, duration, end)
-    provenance: dict[str, Any] = {"method": method, "tolerance": TOLERANCE}
-    if method == "dop853":
-        time, states = _adaptive(flight, step)
-    elif method == "cvodes":
-        time, states = _stiff(flight, step, TOLERANCE)
+    provenance: dict[str, Any] = {"method": method, "tolerance": tolerance}
+    if method in ("dop853", "cvodes"):
+        march = _adaptive if method == "dop853" else _stiff
+        time, states = march(flight, step, tolerance)
         if estimate_error:
-            provenance |= _difference(time, states, *_stiff(flight, step, 0.01 * TOLERANCE))
+            provenance |= _difference(time, states, *march(flight, step, max(0.01 * tolerance, _LEAST_TOLERANCE)))
     elif method == "rk4":
         provenance = {"method": method, "step_s": step, "every": every}
         time, states = _fixed_step(flight, step, every)
@@ -169,7 +188,7 @@ def suggest_step(dynamics: Dynamics, state: Array, parameters: Array, duration: 
     at `state`, and half of that of the fastest eigenvalue, a lag that follows the motion: five times inside the
     stability limit. The instants kept are a tenth of the rigid body's time constant apart, or closer.
     """
-    jacobian = np.array(dynamics.derivative.jacobian()(state, parameters, 0)[0])
+    jacobian = dynamics.jacobian(state, parameters)
     fastest, rigid = (float(np.max(np.abs(np.linalg.eigvals(m)))) for m in (jacobian[3:, 3:], jacobian[3:13, 3:13]))
     instants = math.ceil(max(10.0, duration * rigid / 0.1))
     steps = max(instants, math.ceil(duration * fastest / 0.5))
@@ -183,7 +202,7 @@ def suggest_method(every: int) -> Method:
 
 def record(dynamics: Dynamics, time: Array, states: Array, parameters: Array, provenance: dict[str, Any]) -> Trajectory:
     """The trajectory of states (n, nx), with loads evaluated and range checked."""
-    outputs = dynamics.loads(states.T, np.tile(parameters[:, None], (1, len(time))))
+    outputs = dynamics.loads(states.T, np.tile(parameters[:, None], (1, len(time))), time[None, :])
     force, moment, density, sound = (np.array(output).T for output in outputs)
     quaternion = states[:, QUATERNION] / np.linalg.norm(states[:, QUATERNION], axis=1, keepdims=True)
     trajectory = Trajectory(
@@ -234,57 +253,59 @@ class _Flight(NamedTuple):
 
 
 def _fixed_step(flight: _Flight, step: float, every: int) -> tuple[Array, Array]:
-    return _march(flight, flight.dynamics.march, _BLOCK, step, every, f": try a step below {step:.3g} s")
+    dynamics, start, parameters, duration, end = flight
+    room = math.ceil(duration / step * (1.0 + 1e-12)) // every + 3
+    times, states = np.empty(room), np.empty((room, start.size))
+    rate, monitor = dynamics.rate_kernel.code, dynamics.monitor_kernel.code
+    kept, outcome = runge_kutta(rate, monitor, start, parameters, duration, step, every, end.rows, times, states)
+    if outcome == NOT_FINITE:
+        raise DivergenceError(f"flight is not finite after t = {times[kept - 1]:.6g} s: try a step below {step:.3g} s")
+    return times[:kept].copy(), states[:kept].copy()
+
+
+def _adaptive(flight: _Flight, spacing: float, tolerance: float) -> tuple[Array, Array]:
+    """Instants `spacing` [s] apart, and where the flight ends."""
+    dynamics, start, parameters, duration, end = flight
+    instants = np.append(np.arange(0.0, duration * (1.0 - 1e-12), spacing), duration)
+    times, states = np.empty(instants.size + 1), np.empty((instants.size + 1, start.size))
+    absolute = 0.01 * tolerance * np.maximum(np.abs(start), 1.0)
+    rate, monitor = dynamics.rate_kernel.code, dynamics.monitor_kernel.code
+    limits = (tolerance, absolute)
+    kept, outcome, _ = adaptive(
+        rate, monitor, start, parameters, instants, limits, end.rows, dop853(), _MAX_ADAPTIVE_STEPS, times, states
+    )
+    if outcome in (NOT_FINITE, TOO_MANY_STEPS):
+        why = "it takes too many steps" if outcome == TOO_MANY_STEPS else "it is not finite, or its steps vanish"
+        raise DivergenceError(f"adaptive flight stopped after t = {times[kept - 1]:.6g} s: {why}")
+    return times[:kept].copy(), states[:kept].copy()
 
 
 def _stiff(flight: _Flight, spacing: float, tolerance: float) -> tuple[Array, Array]:
-    """Instants evenly spaced over the duration, at most `spacing` [s] apart."""
-    even = flight.duration / math.ceil(flight.duration / spacing * (1.0 - 1e-12))
-
-    def marches(instants: int) -> Any:
-        march = flight.dynamics.stiff_march(instants, tolerance)
-        return lambda state, parameters, lengths: march(state, parameters, lengths[0, 0])
-
-    remedy = f": CVODES gave up within the next {_STIFF_BLOCK * even:.3g} s"
-    return _march(flight, marches, _STIFF_BLOCK, even, 1, remedy)
-
-
-def _march(
-    flight: _Flight, marches: Callable[[int], Any], block: int, step: float, every: int, remedy: str
-) -> tuple[Array, Array]:
-    """Instants kept (n,) and states (n, nx), the first included; the last step is cut to meet the end exactly."""
+    """Instants evenly spaced over the duration, at most `spacing` [s] apart; the last step is cut to meet the end."""
     dynamics, start, parameters, duration, end = flight
-    lengths = _step_lengths(duration, step)
-    time = np.append(step * np.arange(lengths.size), duration)
-    kept, blocks, before = [0], [start[None, :]], start
-    for first in range(0, lengths.size, block):
-        chosen = lengths[first : first + block]
-        if first == 0 or chosen.size < block:
-            march = marches(chosen.size)
-        states = _marched(march, before, parameters, chosen)
-        passed = np.any(end.margins(dynamics, states) <= 0.0, axis=0)
-        flown = int(np.argmax(passed)) if np.any(passed) else chosen.size
+    number = math.ceil(duration / spacing * (1.0 - 1e-12))
+    even = duration / number
+    time = np.append(even * np.arange(number), duration)
+    blocks, before = [start[None, :]], start
+    for first in range(0, number, _STIFF_BLOCK):
+        chosen = min(_STIFF_BLOCK, number - first)
+        if first == 0 or chosen < _STIFF_BLOCK:
+            march = dynamics.stiff_march(chosen, tolerance)
+        states = _marched(march, before, parameters, even)
+        passed = np.any(end.margins(dynamics, states, parameters) <= 0.0, axis=0)
+        flown = int(np.argmax(passed)) if np.any(passed) else chosen
         good = np.all(np.isfinite(states[:flown]), axis=1)
         if not np.all(good):
             when = time[first + int(np.argmin(good))]
-            raise DivergenceError(f"flight is not finite after t = {when:.6g} s{remedy}")
-        index = first + 1 + np.arange(flown)
-        wanted = (index % every == 0) | (index == lengths.size)
-        kept += index[wanted].tolist()
-        blocks.append(states[:flown][wanted])
-        if flown < chosen.size:
+            within = f"CVODES gave up within the next {_STIFF_BLOCK * even:.3g} s"
+            raise DivergenceError(f"flight is not finite after t = {when:.6g} s: {within}")
+        blocks.append(states[:flown])
+        if flown < chosen:
             here = states[flown - 1] if flown else before
-            length, last = _last_step(flight, marches(1), here, chosen[flown])
-            return np.append(time[kept], time[first + flown] + length), np.vstack([*blocks, last])
+            length, last = _last_step(flight, dynamics.stiff_march(1, tolerance), here, even)
+            return np.append(time[: first + flown + 1], time[first + flown] + length), np.vstack([*blocks, last])
         before = states[-1]
-    return time[kept], np.vstack(blocks)
-
-
-def _step_lengths(duration: float, step: float) -> Array:
-    """Equal steps, and a shorter last one if they do not fill the duration."""
-    whole = math.floor(duration / step * (1.0 + 1e-12))
-    rest = duration - whole * step
-    return np.full(whole, step) if rest < 1e-9 * step else np.append(np.full(whole, step), rest)
+    return time, np.vstack(blocks)
 
 
 def _last_step(flight: _Flight, one: Any, state: Array, step: float) -> tuple[float, Array]:
@@ -292,10 +313,10 @@ def _last_step(flight: _Flight, one: Any, state: Array, step: float) -> tuple[fl
     from scipy.optimize import brentq
 
     def after(length: float) -> Array:
-        return _marched(one, state, flight.parameters, np.array([length]))
+        return _marched(one, state, flight.parameters, length)
 
     def margin(length: float) -> float:
-        return float(flight.end.margins(flight.dynamics, after(length)).min())
+        return float(flight.end.margins(flight.dynamics, after(length), flight.parameters).min())
 
     if margin(step) >= 0.0:  # it ends there, to round-off
         return step, after(step)
@@ -303,46 +324,13 @@ def _last_step(flight: _Flight, one: Any, state: Array, step: float) -> tuple[fl
     return length, after(length)
 
 
-def _marched(march: Any, state: Array, parameters: Array, lengths: Array) -> Array:
-    """States after each step, shape (n, nx); not a number if CVODES gave up."""
+def _marched(march: Any, state: Array, parameters: Array, spacing: float) -> Array:
+    """States at each instant, shape (n, nx); not a number if CVODES gave up."""
     try:
-        return np.array(march(state, parameters, lengths[None, :])).T
+        return np.array(march(state, parameters, spacing)).T
     except RuntimeError as error:
         log.debug("march failed: %s", error)
-        return np.full((lengths.size, state.size), np.nan)
-
-
-def _adaptive(flight: _Flight, step: float) -> tuple[Array, Array]:
-    from scipy.integrate import solve_ivp
-
-    dynamics, start, parameters, duration, end = flight
-
-    def derivative(_: float, state: Array) -> Array:
-        return np.array(dynamics.derivative(state, parameters)).ravel()
-
-    def margin(_: float, state: Array) -> float:
-        return float(end.margins(dynamics, state[None, :]).min(initial=math.inf))
-
-    margin.terminal = True  # type: ignore[attr-defined]
-    events = None if end == End() else margin
-    times = np.append(np.arange(0.0, duration * (1.0 - 1e-12), step), duration)
-    scale = np.maximum(np.abs(start), 1.0)
-    result = solve_ivp(
-        derivative,
-        (0.0, duration),
-        start,
-        "DOP853",
-        times,
-        rtol=TOLERANCE,
-        atol=0.01 * TOLERANCE * scale,
-        events=events,
-    )
-    if not result.success:
-        raise DivergenceError(f"adaptive flight stopped at t = {result.t[-1]:.6g} s: {result.message}")
-    time, states = result.t, result.y.T
-    if result.status == 1 and result.t_events[0][0] > time[-1]:
-        time, states = np.append(time, result.t_events[0][0]), np.vstack([states, result.y_events[0]])
-    return time, states
+        return np.full((march.size2_out(0), state.size), np.nan)
 
 
 def _difference(time: Array, states: Array, finer_time: Array, finer: Array) -> dict[str, float]:

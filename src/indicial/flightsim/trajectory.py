@@ -205,7 +205,8 @@ class Trajectory:
         along = self.position[:, 0]
         if np.any(np.diff(along) <= 0.0):
             raise InputError("stations need a flight that goes downrange all the time (x increasing)")
-        if stations.size == 0 or np.min(stations) < along[0] or np.max(stations) > along[-1]:
+        room = 1e-12 * np.max(np.abs(along))  # what round-off may add to the last station
+        if stations.size == 0 or np.min(stations) < along[0] - room or np.max(stations) > along[-1] + room:
             raise InputError(f"stations must be within x = {along[0]:g} to {along[-1]:g} m of the trajectory")
         distance = CubicSpline(self.time, along)
         times = np.interp(stations, along, self.time)
