@@ -39,8 +39,11 @@ def noisy(exact: History, seed: int, memory: float, level: float = 0.05) -> Hist
     return replace(exact, coefficients=exact.coefficients + level * np.std(exact.coefficients, axis=0) * noise)
 
 
-def covered(memory: float, trials: int) -> tuple[float, float]:
-    """Share of derivatives, and of loads under a motion not seen, that lie within their 95% intervals."""
+def covered(memory: float, trials: int, *, known_start: bool = True) -> tuple[float, float]:
+    """Share of derivatives, and of loads under a motion not seen, that lie within their 95% intervals.
+
+    A start that is not known is as noisy as the loads are.
+    """
     true = two_states()
     exact = true.predict(*noise_motion(3, 300), substeps=1)
     table = true.derivatives()
@@ -48,7 +51,11 @@ def covered(memory: float, trials: int) -> tuple[float, float]:
     wanted = true.predict(*unseen)
     inside, within = [], []
     for seed in range(trials):
-        found = refine_model(true, [noisy(exact, seed, memory)], substeps=1)
+        history = noisy(exact, seed, memory)
+        if not known_start:
+            wrong = 0.05 * np.std(exact.coefficients, axis=0) * np.random.default_rng((seed, 1)).normal(size=6)
+            history = replace(history, before=history.before + wrong)
+        found = refine_model(true, [history], known_start=known_start, substeps=1)
         records = {record.name: record for record in found.derivatives()}
         for name in NAMES:
             assert records[name].uncertainty is not None
@@ -65,6 +72,13 @@ def covered(memory: float, trials: int) -> tuple[float, float]:
 def test_intervals_of_95_percent_hold_the_truth_about_as_often(memory: float) -> None:
     derivatives, loads = covered(memory, 30)
     # three standard deviations of a share of 95% among two independent loads of thirty trials
+    least = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / 60.0)
+    assert least < derivatives
+    assert least < loads
+
+
+def test_intervals_hold_the_truth_where_the_start_is_noisy_too() -> None:
+    derivatives, loads = covered(0.0, 30, known_start=False)
     least = 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / 60.0)
     assert least < derivatives
     assert least < loads

@@ -100,3 +100,12 @@ def test_methods_that_do_not_fit_the_data_are_refused() -> None:
         vector_fit(K[:6], np.ones((6, 1), dtype=complex), 8)
     with pytest.raises(InputError, match="poles is 'some'"):
         realise(known_response(), poles="some")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("part", ["values", "static", "direct"])
+def test_response_of_which_a_needed_part_is_unknown_is_refused(part: str) -> None:
+    response = known_response()
+    holed = getattr(response, part).copy()
+    holed[..., ROWS[0], 1] = np.nan
+    with pytest.raises(InputError, match="response to q: H"):
+        realise(replace(response, **{part: holed}))

@@ -33,11 +33,21 @@ class Record:
         Less those before the motion, at every `inputs.stride`-th sample, shape (n, n_outputs).
     weights : ndarray
         Weight of each load sample, 0 for those held out, shape (n,).
+    known_start : bool
+        Whether the loads before the motion are exact; if not, `refine` finds a constant of each load too.
     """
 
     inputs: MotionInputs
     loads: Array
     weights: Array
+    known_start: bool = True
+
+    def less_level(self, values: Array) -> Array:
+        """`values`, of shape (n, ...), less what a constant of each load takes up where the start is not known."""
+        if self.known_start:
+            return values
+        rest: Array = values - np.average(values, axis=0, weights=self.weights)
+        return rest
 
 
 @dataclass(frozen=True)
@@ -222,7 +232,7 @@ def refine(
 
 def _misfit(system: ModalSystem, record: Record, scale: Array) -> Array:
     weight = np.sqrt(record.weights)[:, None] / scale
-    return np.asarray(((system.respond(record.inputs) - record.loads) * weight).ravel())
+    return np.asarray((record.less_level(system.respond(record.inputs) - record.loads) * weight).ravel())
 
 
 def load_slopes(system: ModalSystem, record: Record, scale: Array, *, free_direct: bool) -> Array:
@@ -243,5 +253,5 @@ def load_slopes(system: ModalSystem, record: Record, scale: Array, *, free_direc
     if free_direct:
         columns.append(np.einsum("nj,op->nopj", u, np.eye(p)).reshape(len(u), p, -1))
     weight = np.sqrt(record.weights)[:, None] / scale
-    weighted: Array = np.concatenate(columns, axis=2) * weight[..., None]
+    weighted: Array = record.less_level(np.concatenate(columns, axis=2)) * weight[..., None]
     return weighted

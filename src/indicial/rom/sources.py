@@ -173,13 +173,24 @@ class FrequencySource(Source):
 
     @classmethod
     def read(cls, response: FrequencyResponse, name: str, outputs: tuple[str, ...]) -> FrequencySource:
-        """The response of some outputs to one input."""
+        """The response of some outputs to one input.
+
+        Raises
+        ------
+        InputError
+            If a value that a model needs is not finite.
+        """
         rows, column = [COEFFICIENTS.index(output) for output in outputs], response.inputs.index(name)
         k, order = np.unique(response.k, return_index=True)
         moving = k > 0.0
         values = response.values[order[moving]][:, rows, column]
-        parts = (array[rows, column] for array in (response.static, response.slope, response.direct))
-        return cls(name, k[moving], values, *parts)
+        static, slope, direct = (array[rows, column] for array in (response.static, response.slope, response.direct))
+        for part, what in ((values, "H(ik)"), (static, "H(0)"), (direct, "H(i inf)")):
+            if not np.all(np.isfinite(part)):
+                raise InputError(
+                    f"frequency response to {name}: {what} of {', '.join(outputs)} is not known everywhere"
+                )
+        return cls(name, k[moving], values, static, slope, direct)
 
     @property
     def name(self) -> str:

@@ -171,6 +171,7 @@ def refine_model(
     histories: Sequence[History],
     *,
     known_direct: bool = False,
+    known_start: bool = True,
     white: bool = False,
     substeps: int = 8,
 ) -> UncertainModel:
@@ -184,6 +185,10 @@ def refine_model(
         At the model's condition, each from a steady state and, unless `white`, with an even time step.
     known_direct : bool
         Keep D as it is.
+    known_start : bool
+        The loads before the motion are exact, as those of a solver are. Where they are one more noisy sample of a
+        measurement, say False: a constant of each load is found too. Else their error is taken for the model's, and the
+        intervals do not tell.
     white : bool
         Take the residuals as independent of each other, which makes intervals too narrow where they are not.
     substeps : int
@@ -201,16 +206,22 @@ def refine_model(
             raise InputError("histories and model differ in flight condition or reference quantities")
         if not white and np.ptp(np.diff(history.s)) > 1e-6 * float(np.max(np.diff(history.s))):
             raise InputError("a history has an uneven time step: its residuals can only be taken as white")
-    records = [record_of(history, model.inputs, model.outputs, substeps) for history in histories]
+    records = [
+        replace(record_of(history, model.inputs, model.outputs, substeps), known_start=known_start)
+        for history in histories
+    ]
     scale = load_sizes(records, model.outputs)
     system = refine(_as_system(model), records, scale, free_direct=not known_direct, evaluations=60)
     slopes = [load_slopes(system, record, scale, free_direct=not known_direct) for record in records]
-    residuals = [(system.respond(record.inputs) - record.loads) / scale for record in records]
-    covariance, noise = _covariance(slopes, residuals, white)
+    residuals = [record.less_level(system.respond(record.inputs) - record.loads) / scale for record in records]
+    constants = 0 if known_start else len(records) * len(model.outputs)
+    covariance, noise = _covariance(slopes, residuals, constants, white)
     return UncertainModel(_as_model(model, system), covariance, noise * scale, system, not known_direct)
 
 
-def _covariance(slopes: Sequence[Array], residuals: Sequence[Array], white: bool) -> tuple[Array, Array]:
+def _covariance(
+    slopes: Sequence[Array], residuals: Sequence[Array], constants: int, white: bool
+) -> tuple[Array, Array]:
     """Covariance of the parameters, and standard deviations of the residuals.
 
     Parameters
@@ -219,6 +230,8 @@ def _covariance(slopes: Sequence[Array], residuals: Sequence[Array], white: bool
         Changes of each record's loads with the parameters, shape (n, n_outputs, n_parameters).
     residuals : sequence of ndarray
         Shape (n, n_outputs).
+    constants : int
+        What else was found from them: levels of the loads.
     white : bool
         Whether lag 0 alone counts.
     """
@@ -226,7 +239,7 @@ def _covariance(slopes: Sequence[Array], residuals: Sequence[Array], white: bool
     size = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
     values, vectors = np.linalg.eigh((rows / size).T @ (rows / size))
     kept = values > _RANK * values[-1]
-    rank = int(np.count_nonzero(kept))
+    rank = int(np.count_nonzero(kept)) + constants
     if len(rows) <= rank:
         raise InputError(f"{len(rows)} loads cannot tell {rank} parameters and their uncertainty")
     inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T / size / size[:, None]
