@@ -159,6 +159,8 @@ def test_what_cannot_be_identified_is_refused() -> None:
     measured = history(known_model(), 1, 120)
     with pytest.raises(InputError, match="no histories"):
         identify([])
+    with pytest.raises(InputError, match="max_order is 0"):
+        identify([measured], max_order=0)
     uneven = replace(measured, time=measured.time * (1.0 + 0.01 * np.linspace(0.0, 1.0, 120)))
     with pytest.raises(InputError, match="uneven"):
         identify([uneven])

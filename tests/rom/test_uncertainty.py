@@ -10,7 +10,7 @@ import pytest
 from indicial.conventions import Array
 from indicial.errors import InputError
 from indicial.history import History
-from indicial.motion import AlphaStep, PitchRateStep
+from indicial.motion import AlphaStep, PitchRateStep, TabulatedMotion
 from indicial.rom import StateSpaceModel, refine_model
 from indicial.rom.identification import record_of
 from indicial.rom.modal_system import Parameters, load_slopes
@@ -164,3 +164,18 @@ def test_uneven_steps_are_taken_as_white_only() -> None:
     record = found.derivatives().one("Cm_q")
     assert record.uncertainty is not None
     assert abs(record.value - two_states().derivatives().value("Cm_q")) < 4.0 * record.uncertainty
+
+
+def test_what_the_histories_cannot_tell_apart_is_infinitely_uncertain() -> None:
+    """With q always in proportion to alpha, what is of either is anybody's guess."""
+    true = two_states()
+    exact = true.predict(*noise_motion(3, 300), substeps=1)
+    rate = np.zeros_like(exact.rate)
+    rate[:, 1] = (exact.alpha - exact.alpha[0]) * 2.0 * CONDITION.speed / REFERENCE.length
+    motion = TabulatedMotion(exact.time, exact.velocity, rate)
+    history = noisy(true.predict(motion, exact.time, substeps=1), 0, 0.0)
+    found = refine_model(true, [history], substeps=1)
+    assert all(np.isinf(record.uncertainty or 0.0) for record in found.derivatives() if record.name in NAMES)
+    same, other = found.predict(history), found.predict(*noise_motion(8, 60))
+    assert np.all(np.isfinite(same.deviation))
+    assert np.all(np.isinf(other.deviation[5:]))

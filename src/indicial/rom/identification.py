@@ -89,6 +89,8 @@ def identify(
     check_names(outputs, COEFFICIENTS, "outputs to identify")
     if direct is not None and np.shape(direct) != (len(outputs), len(inputs)):
         raise InputError(f"direct has shape {np.shape(direct)}, must be {(len(outputs), len(inputs))}")
+    if max_order < 1:
+        raise InputError(f"max_order is {max_order}, must be at least 1")
     step = _time_step(histories)
     records = [record_of(history, inputs, outputs, substeps) for history in histories]
     for j, name in enumerate(inputs):

@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 
 _MOST_LAGS, _DIED_OUT = 12, 1e-3
 _RANK = 1e-10
+_UNSEEN = 1e-3
+"""Part of a change that lies where the histories say nothing, from which an uncertainty is infinite."""
 _DIFFERENCE = 1e-5
 
 
@@ -110,9 +112,10 @@ class UncertainModel:
     noise: Array
     _system: ModalSystem
     _free_direct: bool
+    _unseen: Array  # directions of the parameters that the histories say nothing of, shape (n_parameters, n_unseen)
 
     def derivatives(self) -> DerivativeTable:
-        """Derivatives at k -> 0 with their standard deviations as uncertainty."""
+        """Derivatives at k -> 0 with their standard deviations as uncertainty; infinite for what no history tells."""
         table = self.model.derivatives()
 
         def values(model: StateSpaceModel) -> Array:
@@ -163,7 +166,11 @@ class UncertainModel:
             changes.append((what(which.unpack(at + change)) - what(which.unpack(at - change))) / (2.0 * step))
         slopes = np.stack(changes, axis=-1)
         variance = np.einsum("...i,ij,...j->...", slopes, self.covariance, slopes)
-        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+        deviation = np.sqrt(np.maximum(variance, 0.0))
+        # what the histories say nothing of can be anything; the scale of a state changes nothing that can be seen
+        moved = np.linalg.norm(slopes @ self._unseen, axis=-1)
+        size = np.linalg.norm(slopes, axis=-1) * np.linalg.norm(self._unseen, axis=0).max(initial=0.0)
+        return np.where(moved > _UNSEEN * np.max(size), np.inf, deviation)
 
 
 def refine_model(
@@ -215,14 +222,14 @@ def refine_model(
     slopes = [load_slopes(system, record, scale, free_direct=not known_direct) for record in records]
     residuals = [record.less_level(system.respond(record.inputs) - record.loads) / scale for record in records]
     constants = 0 if known_start else len(records) * len(model.outputs)
-    covariance, noise = _covariance(slopes, residuals, constants, white)
-    return UncertainModel(_as_model(model, system), covariance, noise * scale, system, not known_direct)
+    covariance, noise, unseen = _covariance(slopes, residuals, constants, white)
+    return UncertainModel(_as_model(model, system), covariance, noise * scale, system, not known_direct, unseen)
 
 
 def _covariance(
     slopes: Sequence[Array], residuals: Sequence[Array], constants: int, white: bool
-) -> tuple[Array, Array]:
-    """Covariance of the parameters, and standard deviations of the residuals.
+) -> tuple[Array, Array, Array]:
+    """Covariance of the parameters, standard deviations of the residuals, and directions of which nothing is known.
 
     Parameters
     ----------
@@ -253,7 +260,8 @@ def _covariance(
         for lag, one in enumerate(correlation):
             products = sum(j[: max(len(j) - lag, 0), output].T @ j[lag:, output] for j in slopes)
             middle += one * (products if lag == 0 else products + np.transpose(products))
-    return np.asarray(inverse @ middle @ inverse), noise
+    floored = np.maximum(size, 1e-6 * np.max(size))
+    return np.asarray(inverse @ middle @ inverse), noise, vectors[:, ~kept] / floored[:, None]
 
 
 def autocovariance(residuals: Sequence[Array]) -> Array:
