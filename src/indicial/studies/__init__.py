@@ -15,10 +15,11 @@ def find_study(name: str) -> Study:
         If there is none; the message lists those that there are.
     """
     from indicial.errors import InputError
+    from indicial.studies.bocian import STUDY as BOCIAN
     from indicial.studies.finner import STUDY as FINNER
     from indicial.studies.plate import STUDY as PLATE
 
-    known = {study.name: study for study in (FINNER, PLATE)}
+    known = {study.name: study for study in (BOCIAN, FINNER, PLATE)}
     if name not in known:
         raise InputError(f"no study {name!r}; there are {', '.join(known)}")
     return known[name]

@@ -150,7 +150,7 @@ class SectionLatticeSolver:
     def steady_states(
         self, condition: FlightCondition, rates: Rates = Rates(), *, more: Sequence[Array] = ()
     ) -> tuple[SteadyStrips, ...]:
-        """All distinct steady states that the starts lead to, the one of the settings first.
+        """All distinct steady states that the starts lead to, first the one of the settings' start if it leads to any.
 
         Parameters
         ----------

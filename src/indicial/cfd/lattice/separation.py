@@ -14,7 +14,7 @@ tau = V t/c,
 (Leishman and Beddoes, J. American Helicopter Society 34, 1989: T_p = 1.7, T_f = 3.0 half chords at low Mach numbers,
 without their leading-edge vortex; they let the load be late by T_p, here the incidence, the same for an attached load).
 To first order in frequency that is ``T_f dx/d tau + x = x0(alpha - T_p d alpha/d tau)``, the form of Goman and
-Khrabrov (J. Aircraft 31, 1994), whose constants for an airfoil are larger.
+Khrabrov (J. Aircraft 31, 1994).
 """
 
 from __future__ import annotations

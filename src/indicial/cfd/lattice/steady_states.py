@@ -84,7 +84,7 @@ def settle(
         size = float(np.max(np.abs(change)))
         if size < next_try:
             # near enough for Newton's method? it must not jump to another state
-            found = _polished(problem, sections, across, x, 10.0 * size)
+            found = _polished(problem, sections, across, x, min(300.0 * size, 0.03))
             if found is not None or size < _SETTLED:
                 break
             next_try *= 0.1
