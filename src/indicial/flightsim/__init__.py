@@ -10,6 +10,7 @@ from indicial.flightsim.aerodynamics import (
     SymmetricMissile,
     Validity,
 )
+from indicial.flightsim.aircraft import BodyAxisAerodynamics
 from indicial.flightsim.atmosphere import Air, Atmosphere, ConstantAtmosphere, StandardAtmosphere, air_at
 from indicial.flightsim.comparison import ArmDifference, TrajectoryComparison, compare
 from indicial.flightsim.damping import (
@@ -21,7 +22,7 @@ from indicial.flightsim.damping import (
     holding_roll,
 )
 from indicial.flightsim.dynamics import Dynamics, build_dynamics
-from indicial.flightsim.earth import Earth, FlatEarth
+from indicial.flightsim.earth import WGS84, Earth, FlatEarth
 from indicial.flightsim.epicycle import Arm, EpicyclicFit, fit_epicycle, fit_trajectory
 from indicial.flightsim.initial import InitialState
 from indicial.flightsim.modes import LinearModel, Mode, Modes, linearise, missile_modes
@@ -31,6 +32,7 @@ from indicial.flightsim.vehicle import Vehicle, axisymmetric_inertia, basic_finn
 
 __all__ = [
     "DERIVATIVES",
+    "WGS84",
     "AerodynamicLoads",
     "Aerodynamics",
     "Air",
@@ -38,6 +40,7 @@ __all__ = [
     "ArmDamping",
     "ArmDifference",
     "Atmosphere",
+    "BodyAxisAerodynamics",
     "ConstantAtmosphere",
     "DampingChange",
     "DampingCheck",

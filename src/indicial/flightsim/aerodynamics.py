@@ -70,9 +70,13 @@ class FlowState(NamedTuple):
     incidence: Any
     """(v/V, w/V), 0 at rest, shape (2, 1)."""
     rate: Any
-    """(p, q, r) [rad/s], shape (3, 1)."""
+    """(p, q, r) relative to the air [rad/s], shape (3, 1)."""
     turning: Any
     """``V d(v/V, w/V)/dt`` [m/s^2] of the body-axis components, shape (2, 1)."""
+    velocity: Any
+    """(u, v, w) [m/s], shape (3, 1)."""
+    inertial_rate: Any
+    """(p, q, r) in inertial space [rad/s], shape (3, 1): `rate`, but for the earth's rotation."""
 
 
 class AerodynamicLoads(NamedTuple):

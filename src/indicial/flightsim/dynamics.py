@@ -1,12 +1,14 @@
 r"""One symbolic model of the motion of a rigid vehicle, for simulation, linearisation and identification.
 
-State: position of the centre of gravity (earth axes), its velocity (body axes), attitude quaternion body -> earth
-(scalar first), body rates, aerodynamic lag states.
+State: position of the centre of gravity (earth axes), its velocity over the ground (body axes), attitude quaternion
+body -> earth (scalar first), body rates, aerodynamic lag states.
 
-    m (vdot + omega x v) = F + m R^T g            I omegadot + omega x I omega = M + r x F
-    xdot = R v            qdot = 1/2 q o (0, omega)
+    m (vdot + (omega + Omega) x v) = F + m R^T g            I omegadot + omega x I omega = M + r x F
+    xdot = R v            qdot = 1/2 q o (0, omega - Omega)
 
-with F, M the aerodynamic loads about the moment reference point and r its arm from the centre of gravity.
+with F, M the aerodynamic loads about the moment reference point and r its arm from the centre of gravity; Omega the
+rotation of the earth (body axes), omega the body's in inertial space, g with the centrifugal acceleration. The air
+turns with the earth: the loads see omega - Omega.
 
 The rotation matrix is built from ``q/|q|``, so the motion does not depend on the quaternion's norm; and since qdot is
 linear in q, neither does any Runge-Kutta step. The norm may drift in the last digits and does no harm: no
@@ -281,21 +283,26 @@ def build_dynamics(
     air = atmosphere.air(altitude)
     arm = ca.DM(vehicle.arm_to(aerodynamics.reference.moment_reference))
     turning = ca.SX.sym("turning", 2)
-    flow = _flow(air, velocity + ca.cross(rate, arm), rate, turning)
+    earth_rate = ca.mtimes(rotation.T, ca.sparsify(ca.DM(earth.rotation)))
+    relative = rate - earth_rate
+    flow = _flow(air, velocity + ca.cross(relative, arm), relative, turning, rate)
     force, moment = aerodynamics.loads(flow, lag)
     moment = moment + ca.cross(arm, force)
 
     inertia = ca.sparsify(ca.DM(vehicle.inertia))
     inverse = ca.sparsify(ca.DM(np.linalg.inv(vehicle.inertia)))
     gravity = ca.mtimes(rotation.T, earth.gravity(position))
-    acceleration = force / vehicle.mass + gravity - ca.cross(rate, velocity)
+    acceleration = force / vehicle.mass + gravity - ca.cross(rate + earth_rate, velocity)
     turn_rate = ca.mtimes(inverse, moment - ca.cross(rate, ca.mtimes(inertia, rate)))
+    relative_turn_rate = turn_rate + ca.cross(relative, earth_rate)
 
-    solution = _solve_turning(turning, flow, velocity, rate, arm, acceleration + ca.cross(turn_rate, arm))
+    solution = _solve_turning(
+        turning, flow, velocity + ca.cross(relative, arm), acceleration + ca.cross(relative_turn_rate, arm)
+    )
     derivative = ca.vertcat(
         ca.mtimes(rotation, velocity),
         acceleration,
-        _quaternion_rate(quaternion, rate),
+        _quaternion_rate(quaternion, relative),
         turn_rate,
         aerodynamics.lag_rate(flow, lag),
     )
@@ -325,14 +332,14 @@ def _check_reference(vehicle: Vehicle, aerodynamics: Aerodynamics) -> None:
             raise InputError(f"reference {name} of the aerodynamic model is {model:g}, of {vehicle.name} {own:g}")
 
 
-def _flow(air: Air, velocity: Any, rate: Any, turning: Any) -> FlowState:
+def _flow(air: Air, velocity: Any, rate: Any, turning: Any, inertial: Any) -> FlowState:
     speed = ca.sqrt(ca.sumsqr(velocity) + _REST**2)
-    return FlowState(air.density, air.speed_of_sound, speed, velocity[1:] / speed, rate, turning)
+    return FlowState(air.density, air.speed_of_sound, speed, velocity[1:] / speed, rate, turning, velocity, inertial)
 
 
-def _solve_turning(turning: Any, flow: FlowState, velocity: Any, rate: Any, arm: Any, acceleration: Any) -> Any:
+def _solve_turning(turning: Any, flow: FlowState, velocity: Any, acceleration: Any) -> Any:
     """The T with ``T = T(accelerations(T))``, for accelerations of the moment reference point linear in T."""
-    direction = (velocity + ca.cross(rate, arm)) / flow.speed
+    direction = velocity / flow.speed
     # V de/dt = (e.e) a - e (e.a): nothing at rest, where e = 0
     implied = (ca.sumsqr(direction) * acceleration - direction * ca.dot(direction, acceleration))[1:]
     slope = ca.jacobian(implied, turning)
