@@ -99,3 +99,15 @@ def test_orders_out_of_range_are_refused() -> None:
         truncate(large_model(), 15)
     with pytest.raises(InputError, match="k_max is -1"):
         truncate(large_model(), k_max=-1.0)
+    with pytest.raises(InputError, match="tolerance is nan"):
+        truncate(large_model(), tolerance=float("nan"))
+
+
+def test_a_tolerance_that_no_order_meets_is_said(caplog: pytest.LogCaptureFixture) -> None:
+    truncate(large_model(), tolerance=0.02, k_max=1.0)
+    truncate(large_model(), 4, tolerance=0.0)
+    assert not caplog.text
+    # all states in other coordinates are right to round-off, not exactly
+    cut = truncate(large_model(), tolerance=0.0, k_max=1.0)
+    assert cut.error > 0.0
+    assert "no order meets the tolerance" in caplog.text

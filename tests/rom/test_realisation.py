@@ -205,6 +205,23 @@ def test_too_few_samples_and_bad_choices_are_refused() -> None:
         realise(data, "fourier")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="order is 0"):
         realise(data, order=0)
+    with pytest.raises(InputError, match="order is 60, must be from 1 to 30"):
+        realise(data, order=60)
+    with pytest.raises(InputError, match="max_order is 60, must be from 1 to 30"):
+        realise(data, max_order=60)
+    with pytest.raises(InputError, match="tolerance is nan"):
+        realise(data, tolerance=float("nan"))
+
+
+def test_a_tolerance_that_no_order_meets_is_said(caplog: pytest.LogCaptureFixture) -> None:
+    data = responses(known_system(), CONDITION, graded(150.0, 100))
+    realise(data, "modal", tolerance=1.0)
+    realise(data, "modal", 1, tolerance=1e-9)
+    assert not caplog.text
+    model = realise(data, "exponential", max_order=1, tolerance=1e-3)
+    assert min(one.held_out for one in model.candidates) > 1e-3
+    assert "no order meets the tolerance" in caplog.text
+    assert "response to q" in caplog.text
 
 
 def test_era_recovers_poles_of_exact_free_decay() -> None:

@@ -11,6 +11,7 @@ A state counts by what inputs excite of it and what loads show of it: the Hankel
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 METHOD = "balanced truncation"
+
+_LOG = logging.getLogger(__name__)
 
 _Cut = Callable[[int], Reduced | None]
 
@@ -104,17 +107,21 @@ def truncate(
     k_max : float, optional
         Highest reduced frequency that matters; all do if not given.
     tolerance : float
-        Largest error of H over these frequencies, relative to the size of its output and input.
+        Largest error of H over these frequencies, relative to the size of its output and input. Where
+        every order is tried and none that was meets it, a warning is logged.
 
     Raises
     ------
     InputError
-        If the model has no states, or `order` is out of range; with `k_max` two states per input are the fewest.
+        If the model has no states, `tolerance` is no number, or `order` is out of range; with `k_max` two states
+        per input are the fewest.
     """
     if model.order == 0:
         raise InputError("the model has no states, there is nothing to leave out")
     if k_max is not None and not (np.isfinite(k_max) and k_max > 0.0):
         raise InputError(f"k_max is {k_max}, must be positive and finite")
+    if not tolerance >= 0.0:
+        raise InputError(f"tolerance is {tolerance}, must be 0 or more")
     full = Reduced(model.a, model.b, model.c, model.d)
     k = _band(model, k_max)
     transfer = full.transfer(k)
@@ -134,6 +141,11 @@ def truncate(
             break
     if reduced is None:
         raise InputError(f"no model of {order or model.order} states keeps H(0) and H'(0); ask for more states")
+    if order is None and trials[-1].error > tolerance:
+        _LOG.warning(
+            "truncated model: no order meets the tolerance %.2g, the error of H is %.2g with %d states",
+            tolerance, trials[-1].error, trials[-1].order,
+        )  # fmt: skip
     trials[-1] = replace(trials[-1], chosen=True)
     small = replace(
         model, a=reduced.a, b=reduced.b, c=reduced.c, d=reduced.d, method=f"{model.method}, {METHOD}", errors=()

@@ -20,6 +20,7 @@ from indicial.conventions import COEFFICIENTS, Array
 from indicial.errors import InputError
 from indicial.history import History
 from indicial.rom.era import Sampled, era, stable_modes
+from indicial.rom.excitation import undetermined_shares
 from indicial.rom.modal_system import ModalSystem, Record, fit_inputs, fit_rank_one, refine
 from indicial.rom.modes import Modes
 from indicial.rom.okid import observer_markov, system_markov
@@ -32,7 +33,7 @@ _LOG = logging.getLogger(__name__)
 
 _HELD_OUT = 0.3
 _POOR = 0.3
-"""Held-out error, relative to the loads, from which a warning is logged."""
+"""Held-out error, or uncertainty of what each input causes, relative to the loads, from which a warning is logged."""
 _ENOUGH = 1.05
 """Held-out error relative to the least, up to which fewer states are taken."""
 _RACE = 8
@@ -78,7 +79,7 @@ def identify(
     -------
     StateSpaceModel
         Stable whatever the data. Its `candidates` are for all inputs together; where even the best predicts badly what
-        was held out, a warning is logged.
+        was held out, or the motions do not tell what each input causes, a warning is logged.
 
     Raises
     ------
@@ -105,7 +106,24 @@ def identify(
     if candidates[best].held_out > _POOR:
         error = candidates[best].held_out
         _LOG.warning("identified model: off by %.0f%% of the loads that were held out; do not trust it", 100.0 * error)
+    _warn_of_inputs_alike(chosen, everything, scale, inputs, direct is None)
     return _model(chosen, histories, records, inputs, outputs, candidates, best)
+
+
+def _warn_of_inputs_alike(
+    chosen: ModalSystem, records: Sequence[Record], scale: Array, inputs: tuple[str, ...], free_direct: bool
+) -> None:
+    if len(inputs) == 1:
+        return
+    shares = undetermined_shares(chosen, records, scale, free_direct=free_direct)
+    alike = [name for name, share in zip(inputs, shares, strict=True) if share > _POOR]
+    if alike:
+        _LOG.warning(
+            "identified model of %d states: the motions do not tell %s apart; do not trust what it says of each "
+            "(move them independently: motion.Multisine gives alpha and q frequencies of their own)",
+            chosen.modes.order,
+            " and ".join(alike) if len(alike) > 1 else f"{alike[0]} and the other inputs",
+        )
 
 
 def _time_step(histories: Sequence[History]) -> float:

@@ -22,6 +22,7 @@ exactly as the data give them, and it is stable by construction. Ways to the pol
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -47,9 +48,12 @@ METHODS = ("exponential", "era", "vector fitting", "modal")
 
 Poles = Literal["separate", "shared"]
 
+_LOG = logging.getLogger(__name__)
+
 _WORST_CANCELLATION = 1e4  # amplitudes may exceed the deficiency function by this, no more
 _RACE = 15  # evaluations after which the two best starts are chosen
 _FEWEST_SAMPLES = 6
+_MOST_POLES = 30  # for each input; more than any load has lags that samples can tell
 _DIRECT = ("era", "vector fitting")  # whose poles are taken as they are
 
 
@@ -83,15 +87,15 @@ def realise(
     method : {"auto", "exponential", "era", "vector fitting", "modal"}
         ``era`` reads step responses, ``vector fitting`` frequency responses.
     order : int, optional
-        Poles for each input; chosen by held-out error if not given.
+        Poles for each input, 30 at most; chosen by held-out error if not given.
     poles : {"separate", "shared"}
         Whether each input has poles of its own, or all inputs the same: still with states of their own.
     outputs : tuple of str, optional
         Of a frequency response, CN and Cm if not given; step responses bring theirs.
     max_order : int
-        Most poles for each input that are tried.
+        Most poles for each input that are tried, 30 at most.
     tolerance : float
-        Held-out error at which no larger order is tried.
+        Held-out error at which no larger order is tried. Where no order meets it, a warning is logged.
     match_integral : bool
         Impose the integral of the deficiency function, that is H'(0) (needs two poles or more).
 
@@ -102,9 +106,11 @@ def realise(
     Raises
     ------
     InputError
-        If the samples are too few, or no realisation of the order asked for is well posed.
+        If the samples are too few, `tolerance` is no number, an order is out of range, or no realisation of the order
+        asked for is well posed.
     """
     _check(data, method, order, poles, outputs)
+    _check_search(order, max_order, tolerance)
     sources = _sources(data, outputs)
     for source in sources:
         if source.count < _FEWEST_SAMPLES:
@@ -118,6 +124,11 @@ def realise(
             trials = _trials(group, methods, orders, tolerance, match_integral)
             best = _choose(trials, tolerance)
             blocks += _fit_all(group, best, match_integral)
+        if order is None and min(t.candidate.held_out for t in trials) > tolerance:
+            _LOG.warning(
+                "realised model: no order meets the tolerance %.2g for the response to %s, the held-out error is %.2g "
+                "with %d poles", tolerance, best.candidate.input, best.candidate.held_out, best.candidate.order,
+            )  # fmt: skip
         candidates += [replace(t.candidate, chosen=t is best) for t in trials]
     model = StateSpaceModel(
         a=block_diag(*(block[0] for block in blocks)),
@@ -158,8 +169,6 @@ def _check(
 ) -> None:
     if method not in ("auto", *METHODS):
         raise InputError(f"method is {method!r}, must be one of auto, {', '.join(METHODS)}")
-    if order is not None and order < 1:
-        raise InputError(f"order is {order}, must be at least 1")
     if poles not in ("separate", "shared"):
         raise InputError(f"poles is {poles!r}, must be 'separate' or 'shared'")
     if isinstance(data, StepResponses):
@@ -171,6 +180,14 @@ def _check(
         raise InputError("era reads step responses; of a frequency response take 'vector fitting'")
     elif outputs is not None:
         check_names(outputs, COEFFICIENTS, "outputs of a realisation")
+
+
+def _check_search(order: int | None, max_order: int, tolerance: float) -> None:
+    for name, value in (("order", order), ("max_order", max_order)):
+        if value is not None and not 1 <= value <= _MOST_POLES:
+            raise InputError(f"{name} is {value}, must be from 1 to {_MOST_POLES} poles for each input")
+    if not tolerance >= 0.0:
+        raise InputError(f"tolerance is {tolerance}, must be 0 or more")
 
 
 def _sources(
