@@ -53,7 +53,7 @@ _LOG = logging.getLogger(__name__)
 _WORST_CANCELLATION = 1e4  # amplitudes may exceed the deficiency function by this, no more
 _RACE = 15  # evaluations after which the two best starts are chosen
 _FEWEST_SAMPLES = 6
-_MOST_POLES = 30  # for each input; more than any load has lags that samples can tell
+_MOST_POLES = 30  # for each input; the case file allows as many
 _DIRECT = ("era", "vector fitting")  # whose poles are taken as they are
 
 
