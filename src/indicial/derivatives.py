@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from indicial.conventions import RateNormalisation, ReferenceQuantities
 from indicial.errors import InputError
-from indicial.files import write_text
+from indicial.files import parse_json, write_text
 from indicial.motion import FlightCondition
 
 if TYPE_CHECKING:
@@ -205,10 +205,7 @@ class DerivativeTable:
     @classmethod
     def from_json(cls, path: str | Path) -> Self:
         """Read the derivatives of `to_json`, or of any ``results.json``."""
-        try:
-            content = json.loads(Path(path).read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise InputError(f"{path}: not a readable JSON file ({error})") from error
+        content = parse_json(path)
         if not isinstance(content, dict) or content.get("schema_version") != SCHEMA_VERSION:
             raise InputError(f"{path}: schema_version must be {SCHEMA_VERSION}")
         return cls.from_records(content.get("derivatives", []))

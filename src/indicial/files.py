@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -39,6 +40,49 @@ def write_text(path: str | Path, text: str) -> None:
     """Write `text` to `path` in one step."""
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def parse_json(path: str | Path) -> Any:
+    """What a JSON file holds.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or is not one.
+    """
+    try:
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: not a readable JSON file ({error})") from error
+
+
+def read_json(path: str | Path, format_: str, version: int) -> dict[str, Any]:
+    """Content of a JSON file of this format and version.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or holds something else.
+    """
+    values = parse_json(path)
+    known = isinstance(values, dict) and values.get("format") == format_
+    if not known or values.get("schema_version") != version:
+        raise InputError(f"{path}: not an {format_} of schema version {version}")
+    content: dict[str, Any] = values
+    return content
+
+
+@contextmanager
+def parts_of(path: str | Path) -> Iterator[None]:
+    """Say of which file it is that a part is missing or bad."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    except KeyError as error:
+        raise InputError(f"{path}: damaged, a part is missing ({error.args[0]})") from error
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{path}: damaged ({error})") from error
 
 
 def write_netcdf(path: str | Path, data: xarray.Dataset) -> None:

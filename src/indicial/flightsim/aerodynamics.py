@@ -121,6 +121,15 @@ class Aerodynamics(Protocol):
         ...
 
 
+def free_symbols(values: Iterable[Any]) -> tuple[Any, ...]:
+    """Casadi symbols among values, each once, in their order."""
+    symbols: dict[str, Any] = {}
+    for value in values:
+        if isinstance(value, ca.SX):
+            symbols.update((symbol.name(), symbol) for symbol in ca.symvar(value))
+    return tuple(symbols.values())
+
+
 @dataclass(frozen=True, kw_only=True)
 class SymmetricMissile(ABC):
     r"""Axial force and roll of a missile of rotational symmetry, and one plane's model used in both.
@@ -165,12 +174,7 @@ class SymmetricMissile(ABC):
     @property
     def parameters(self) -> tuple[Any, ...]:
         """Free casadi symbols among the values, in the order of the fields."""
-        symbols: dict[str, Any] = {}
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if isinstance(value, ca.SX):
-                symbols.update((symbol.name(), symbol) for symbol in ca.symvar(value))
-        return tuple(symbols.values())
+        return free_symbols(getattr(self, item.name) for item in fields(self))
 
     @property
     def rate_scale(self) -> float:

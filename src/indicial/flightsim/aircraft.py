@@ -10,7 +10,7 @@ import casadi as ca
 
 from indicial.conventions import ReferenceQuantities
 from indicial.errors import InputError
-from indicial.flightsim.aerodynamics import AerodynamicLoads, FlowState, Validity
+from indicial.flightsim.aerodynamics import AerodynamicLoads, FlowState, Validity, free_symbols
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,12 +79,7 @@ class BodyAxisAerodynamics:
     @property
     def parameters(self) -> tuple[Any, ...]:
         """Free casadi symbols among the values, in the order of the fields."""
-        symbols: dict[str, Any] = {}
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if isinstance(value, ca.SX):
-                symbols.update((symbol.name(), symbol) for symbol in ca.symvar(value))
-        return tuple(symbols.values())
+        return free_symbols(getattr(self, item.name) for item in fields(self))
 
     @property
     def lag_names(self) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ from scipy.interpolate import BSpline, CubicHermiteSpline, make_interp_spline
 
 from indicial.conventions import COEFFICIENTS, Array, ReferenceQuantities
 from indicial.errors import InputError
-from indicial.files import write_text
+from indicial.files import parts_of, read_json, write_text
 from indicial.history import History
 from indicial.motion import FlightCondition, Motion
 from indicial.rom.model import ComplexArray
@@ -137,13 +137,16 @@ class NonlinearModel:
         Raises
         ------
         InputError
-            If the motion leaves the angles that are known, or varies another input.
+            If the motion leaves the angles that are known, varies another input, or comes from a history of other
+            reference quantities.
         """
         names = self.inputs
         if isinstance(motion, History):
             if times is not None:
                 raise InputError("times are those of the history to predict; give times with a Motion only")
             self._check(motion.condition)
+            if motion.reference != self.reference:
+                raise InputError("history and model differ in reference quantities; convert one of them first")
             given = MotionInputs.from_history(motion, names, self.condition, neglect=neglect, substeps=substeps)
             time, velocity, rate = motion.time, motion.velocity, motion.rate
             condition, described = motion.condition, motion.motion
@@ -237,31 +240,26 @@ class NonlinearModel:
         Raises
         ------
         InputError
-            If the file is missing or holds something else.
+            If the file is missing, damaged or holds something else.
         """
-        try:
-            values = json.loads(Path(path).read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise InputError(f"{path}: not a readable JSON file ({error})") from error
-        known = isinstance(values, dict) and values.get("format") == FORMAT
-        if not known or values.get("schema_version") != SCHEMA_VERSION:
-            raise InputError(f"{path}: not an {FORMAT} of schema version {SCHEMA_VERSION}")
-        responses = tuple(
-            AngleResponses(
-                one["input"], np.array(one["rates"]), np.array(one["pairs"]).reshape(-1, 2),
-                np.array(one["static"]), np.array(one["amplitudes"]),
+        values = read_json(path, FORMAT, SCHEMA_VERSION)
+        with parts_of(path):
+            responses = tuple(
+                AngleResponses(
+                    one["input"], np.array(one["rates"]), np.array(one["pairs"]).reshape(-1, 2),
+                    np.array(one["static"]), np.array(one["amplitudes"]),
+                )
+                for one in values["responses"]
+            )  # fmt: skip
+            return cls(
+                np.array(values["alpha"]),
+                np.array(values["baselines"]),
+                responses,
+                tuple(values["outputs"]),
+                FlightCondition(**values["condition"]),
+                ReferenceQuantities.from_dict(values["reference"]),
+                values["provenance"],
             )
-            for one in values["responses"]
-        )  # fmt: skip
-        return cls(
-            np.array(values["alpha"]),
-            np.array(values["baselines"]),
-            responses,
-            tuple(values["outputs"]),
-            FlightCondition(**values["condition"]),
-            ReferenceQuantities.from_dict(values["reference"]),
-            values["provenance"],
-        )
 
     def summary(self) -> str:
         """Angles, lags, and how well steps and steady states go together."""

@@ -23,7 +23,7 @@ from threadpoolctl import threadpool_limits
 
 from indicial.conventions import Array, ReferenceQuantities
 from indicial.errors import InputError
-from indicial.files import write_text
+from indicial.files import parts_of, read_json, write_text
 from indicial.motion import FlightCondition
 from indicial.rom.mode_fitting import TimeTarget
 from indicial.rom.modes import Modes
@@ -206,28 +206,23 @@ class ScheduledModel:
         Raises
         ------
         InputError
-            If the file is missing or holds something else.
+            If the file is missing, damaged or holds something else.
         """
-        try:
-            values = json.loads(Path(path).read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise InputError(f"{path}: not a readable JSON file ({error})") from error
-        known = isinstance(values, dict) and values.get("format") == FORMAT
-        if not known or values.get("schema_version") != SCHEMA_VERSION:
-            raise InputError(f"{path}: not an {FORMAT} of schema version {SCHEMA_VERSION}")
-        return cls(
-            nodes=Nodes(np.array(values["mach"]), np.array(values["alpha"])),
-            families=tuple(
-                ModeFamily(one["real"], one["degree"], np.array(one["coefficients"])) for one in values["families"]
-            ),
-            amplitudes=tuple(np.array(one) for one in values["amplitudes"]),
-            **{name: np.array(values[name]) for name in ("direct", "static", "integral", "baselines")},
-            inputs=tuple(values["inputs"]),
-            outputs=tuple(values["outputs"]),
-            condition=FlightCondition(**values["condition"]),
-            reference=ReferenceQuantities.from_dict(values["reference"]),
-            refused=dict(values["refused"]),
-        )
+        values = read_json(path, FORMAT, SCHEMA_VERSION)
+        with parts_of(path):
+            return cls(
+                nodes=Nodes(np.array(values["mach"]), np.array(values["alpha"])),
+                families=tuple(
+                    ModeFamily(one["real"], one["degree"], np.array(one["coefficients"])) for one in values["families"]
+                ),
+                amplitudes=tuple(np.array(one) for one in values["amplitudes"]),
+                **{name: np.array(values[name]) for name in ("direct", "static", "integral", "baselines")},
+                inputs=tuple(values["inputs"]),
+                outputs=tuple(values["outputs"]),
+                condition=FlightCondition(**values["condition"]),
+                reference=ReferenceQuantities.from_dict(values["reference"]),
+                refused=dict(values["refused"]),
+            )
 
     def summary(self) -> str:
         """Range, states, and the slowest lag at both ends."""

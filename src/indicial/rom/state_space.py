@@ -3,8 +3,6 @@ r"""State-space model of unsteady loads in reduced time."""
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from indicial.conventions import COEFFICIENTS, Array, ReferenceQuantities
 from indicial.errors import InputError
-from indicial.files import read_netcdf, write_netcdf, write_text
+from indicial.files import parts_of, read_json, read_netcdf, write_netcdf, write_text
 from indicial.motion import FlightCondition
 from indicial.rom.modal import ModalForm
 from indicial.rom.model import ComplexArray, ReducedModel
@@ -267,14 +265,8 @@ class StateSpaceModel(ReducedModel):
         InputError
             If the file is missing, damaged or holds something else.
         """
-        try:
-            values = json.loads(Path(path).read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise InputError(f"{path}: not a readable JSON file ({error})") from error
-        known = isinstance(values, dict) and values.get("format") == FORMAT
-        if not known or values.get("schema_version") != SCHEMA_VERSION:
-            raise InputError(f"{path}: not an {FORMAT} of schema version {SCHEMA_VERSION}")
-        with _of_file(path):
+        values = read_json(path, FORMAT, SCHEMA_VERSION)
+        with parts_of(path):
             return cls.from_dict(values)
 
     def to_dataset(self) -> xarray.Dataset:
@@ -306,7 +298,7 @@ class StateSpaceModel(ReducedModel):
             If the file is missing, damaged or holds something else.
         """
         data = read_netcdf(path, FORMAT, SCHEMA_VERSION)
-        with _of_file(path):
+        with parts_of(path):
             matrices = {name.lower(): data[name].values for name in ("A", "B", "C", "D", "baseline")}
             return cls.from_dict({**matrices, **json.loads(data.attrs["description"])})
 
@@ -353,16 +345,3 @@ class StateSpaceModel(ReducedModel):
 
 def _pole_text(pole: complex) -> str:
     return f"{pole.real:.4g}" if pole.imag == 0.0 else f"{pole.real:.4g} +- {pole.imag:.4g}i"
-
-
-@contextmanager
-def _of_file(path: str | Path) -> Iterator[None]:
-    """Say of which file it is that what it holds is no model."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
-    except KeyError as error:
-        raise InputError(f"{path}: damaged, a part is missing ({error.args[0]})") from error
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{path}: damaged ({error})") from error

@@ -13,7 +13,7 @@ from typing import Any, Self
 from indicial import __version__
 from indicial.derivatives import Derivative, DerivativeTable
 from indicial.errors import InputError
-from indicial.files import write_text
+from indicial.files import parse_json, write_text
 
 SCHEMA_VERSION = 1
 
@@ -147,10 +147,7 @@ def read_json(path: Path) -> dict[str, Any]:
     InputError
         If it is not one.
     """
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: not a readable JSON file ({error})") from error
+    content = parse_json(path)
     if not isinstance(content, dict) or content.get("schema_version") != SCHEMA_VERSION:
         raise InputError(f"{path}: schema_version must be {SCHEMA_VERSION}")
     return content

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +13,8 @@ from indicial.cfd import FiniteVolumeSolver
 from indicial.cfd.flow.gas import P
 from indicial.cfd.mesh import Mesh
 from indicial.errors import InputError
-from indicial.files import atomic_path
 from indicial.motion import FlightCondition
-from indicial.studies.finner.pitching_flow import Patch
-
-SCHEMA_VERSION = 1
+from indicial.studies.finner.pitching_flow import Patch, stored_arrays, write_arrays
 
 RADIUS = 1.0
 """Of the cylinder [calibres]: half way along the span of the fins."""
@@ -59,9 +55,7 @@ class AcrossFins:
 
     def save(self, path: Path) -> None:
         """Write a compressed numpy archive in one step."""
-        arrays = {"schema_version": SCHEMA_VERSION, "flight": self.mach, **self.surface.to_arrays("surface")}
-        with atomic_path(path) as temporary, temporary.open("wb") as stream:
-            np.savez_compressed(stream, **arrays)
+        write_arrays(path, {"flight": self.mach, **self.surface.to_arrays("surface")})
 
     @classmethod
     def load(cls, path: Path) -> Self:
@@ -72,13 +66,8 @@ class AcrossFins:
         InputError
             If it is something else, or of another version.
         """
-        try:
-            with np.load(path, allow_pickle=False) as stored:
-                if int(stored["schema_version"]) != SCHEMA_VERSION:
-                    raise ValueError(f"schema_version must be {SCHEMA_VERSION}")
-                return cls(Patch.from_arrays(stored, "surface", ("mach", "lag")), float(stored["flight"]))
-        except (OSError, EOFError, ValueError, KeyError, BadZipFile) as error:
-            raise InputError(f"{path}: not a flow across fins ({error})") from error
+        with stored_arrays(path, "a flow across fins") as stored:
+            return cls(Patch.from_arrays(stored, "surface", ("mach", "lag")), float(stored["flight"]))
 
 
 def _cylinder(mesh: Mesh, diameter: float) -> NDArray[Any]:

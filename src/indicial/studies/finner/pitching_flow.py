@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -23,6 +24,30 @@ WINDOW = ((-2.5, 13.0), (-5.5, 5.5))
 """x and z [calibres] between which faces of the symmetry plane are kept; meshes with a sting reach far beyond."""
 
 Indices = NDArray[np.int32]
+
+
+def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
+    """Write a compressed numpy archive of this schema in one step."""
+    with atomic_path(path) as temporary, temporary.open("wb") as stream:
+        np.savez_compressed(stream, schema_version=SCHEMA_VERSION, **arrays)
+
+
+@contextmanager
+def stored_arrays(path: Path, what: str) -> Iterator[Any]:
+    """Arrays of an archive of this schema, to make `what` of.
+
+    Raises
+    ------
+    InputError
+        If it is something else, or of another version.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            if int(stored["schema_version"]) != SCHEMA_VERSION:
+                raise ValueError(f"schema_version must be {SCHEMA_VERSION}")
+            yield stored
+    except (OSError, EOFError, ValueError, KeyError, BadZipFile) as error:
+        raise InputError(f"{path}: not {what} ({error})") from error
 
 
 @dataclass(frozen=True)
@@ -124,11 +149,10 @@ class PitchingFlow:
 
     def save(self, path: Path) -> None:
         """Write a compressed numpy archive in one step, in single precision."""
-        arrays: dict[str, Any] = {"schema_version": SCHEMA_VERSION, "flight": np.array([self.mach, self.alpha, self.q])}
+        arrays: dict[str, Any] = {"flight": np.array([self.mach, self.alpha, self.q])}
         for name, patch in (("wall", self.wall), ("plane", self.plane)):
             arrays |= patch.to_arrays(name)
-        with atomic_path(path) as temporary, temporary.open("wb") as stream:
-            np.savez_compressed(stream, **arrays)
+        write_arrays(path, arrays)
 
     @classmethod
     def load(cls, path: Path) -> Self:
@@ -139,13 +163,8 @@ class PitchingFlow:
         InputError
             If it is something else, or of another version.
         """
-        try:
-            with np.load(path, allow_pickle=False) as stored:
-                if int(stored["schema_version"]) != SCHEMA_VERSION:
-                    raise ValueError(f"schema_version must be {SCHEMA_VERSION}")
-                wall = Patch.from_arrays(stored, "wall", ("cp",))
-                plane = Patch.from_arrays(stored, "plane", ("cp", "mach"))
-                mach, alpha, q = stored["flight"].tolist()
-                return cls(wall, plane, mach, alpha, q)
-        except (OSError, EOFError, ValueError, KeyError, BadZipFile) as error:
-            raise InputError(f"{path}: not a flow in steady pitch ({error})") from error
+        with stored_arrays(path, "a flow in steady pitch") as stored:
+            wall = Patch.from_arrays(stored, "wall", ("cp",))
+            plane = Patch.from_arrays(stored, "plane", ("cp", "mach"))
+            mach, alpha, q = stored["flight"].tolist()
+            return cls(wall, plane, mach, alpha, q)
