@@ -184,3 +184,19 @@ def test_angles_beyond_the_known_ones_are_refused():
     motion = oscillation(0.3, np.radians(20.0))
     with pytest.raises(InputError, match="from alpha -20 to 20 deg"):
         model().predict(motion, np.linspace(0.0, motion.period, 81))
+
+
+def test_a_history_of_other_reference_quantities_is_refused():
+    motion = oscillation(0.3, np.radians(5.0))
+    history = model().predict(motion, np.linspace(0.0, motion.period, 30))
+    other = replace(history, reference=replace(history.reference, length=2.0 * history.reference.length))
+    with pytest.raises(InputError, match="differ in reference quantities"):
+        model().predict(other)
+
+
+def test_a_damaged_file_is_named_with_what_it_lacks(tmp_path):
+    path = tmp_path / "model.json"
+    model().to_json(path)
+    path.write_text(path.read_text().replace('"baselines"', '"base_lines"'))
+    with pytest.raises(InputError, match=r"model\.json: damaged, a part is missing \(baselines\)"):
+        NonlinearModel.from_json(path)
