@@ -159,7 +159,7 @@ def test_moments_are_transferred_to_the_centre_of_gravity() -> None:
     vehicle = replace(FINNER, centre_of_gravity=(0.12, 0.03, 0.01))
     model = ConstantForce(FINNER.reference.about((0.10, 0.0, 0.0)))
     dynamics = build_dynamics(vehicle, model)
-    _, moment, _, _ = dynamics.loads(dynamics.initial_vector(STRAIGHT), [], 0.0)
+    _, moment, *_ = dynamics.loads(dynamics.initial_vector(STRAIGHT), [], 0.0)
     arm = np.array([0.02, -0.03, 0.01])  # forward, left, down of the centre of gravity
     assert np.array(moment).ravel() == pytest.approx(np.array([0.1, 0.2, 0.3]) + np.cross(arm, [1.0, 2.0, 3.0]))
 

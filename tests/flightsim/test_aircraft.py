@@ -95,7 +95,7 @@ def test_loads_are_the_coefficients_they_are_defined_by() -> None:
     vehicle = Vehicle("body", 10.0, np.eye(3), reference, (0.0, 0.0, 0.0))
     dynamics = build_dynamics(vehicle, model)
     start = InitialState.from_path(60.0, alpha=0.1, beta=0.2, rate=(1.0, 2.0, 3.0))
-    force, moment, density, _ = (
+    force, moment, density, *_ = (
         np.array(part).ravel() for part in dynamics.loads(dynamics.initial_vector(start), [], 0.0)
     )
     direction = start.velocity / 60.0

@@ -24,14 +24,25 @@ from indicial.flightsim.damping import (
 from indicial.flightsim.dynamics import Dynamics, build_dynamics
 from indicial.flightsim.earth import WGS84, Earth, FlatEarth
 from indicial.flightsim.epicycle import Arm, EpicyclicFit, fit_epicycle, fit_trajectory
+from indicial.flightsim.expressions import ALPHA, ALTITUDE, BETA, MACH, TIME, TOTAL_ANGLE, table
+from indicial.flightsim.forces import Force, FunctionForce, Motor
 from indicial.flightsim.initial import InitialState
 from indicial.flightsim.modes import LinearModel, Mode, Modes, linearise, missile_modes
+from indicial.flightsim.signals import Signal
 from indicial.flightsim.simulate import End, fly, simulate
 from indicial.flightsim.trajectory import Trajectory
+from indicial.flightsim.turbulence import DrydenTurbulence
 from indicial.flightsim.vehicle import Vehicle, axisymmetric_inertia, basic_finner_range_model
+from indicial.flightsim.wind import CosineGust, SteadyWind, Wind, WindProfile, Winds
 
 __all__ = [
+    "ALPHA",
+    "ALTITUDE",
+    "BETA",
     "DERIVATIVES",
+    "MACH",
+    "TIME",
+    "TOTAL_ANGLE",
     "WGS84",
     "AerodynamicLoads",
     "Aerodynamics",
@@ -42,26 +53,36 @@ __all__ = [
     "Atmosphere",
     "BodyAxisAerodynamics",
     "ConstantAtmosphere",
+    "CosineGust",
     "DampingChange",
     "DampingCheck",
     "DerivativeAerodynamics",
+    "DrydenTurbulence",
     "Dynamics",
     "Earth",
     "End",
     "EpicyclicFit",
     "FlatEarth",
     "FlowState",
+    "Force",
+    "FunctionForce",
     "InitialState",
     "LinearModel",
     "Mode",
     "Modes",
+    "Motor",
+    "Signal",
     "StandardAtmosphere",
     "StateSpaceAerodynamics",
+    "SteadyWind",
     "SymmetricMissile",
     "Trajectory",
     "TrajectoryComparison",
     "Validity",
     "Vehicle",
+    "Wind",
+    "WindProfile",
+    "Winds",
     "air_at",
     "axisymmetric_inertia",
     "basic_finner_range_model",
@@ -76,4 +97,5 @@ __all__ = [
     "linearise",
     "missile_modes",
     "simulate",
+    "table",
 ]

@@ -28,6 +28,7 @@ import numpy as np
 from indicial.conventions import Array, ReferenceQuantities, transfer_longitudinal
 from indicial.derivatives import DerivativeTable
 from indicial.errors import InputError
+from indicial.flightsim.expressions import free_symbols
 
 if TYPE_CHECKING:
     from control import StateSpace
@@ -119,15 +120,6 @@ class Aerodynamics(Protocol):
     def lag_rate(self, flow: FlowState, lag: Any) -> Any:
         """Time derivative of the lag states [1/s], shape (n, 1)."""
         ...
-
-
-def free_symbols(values: Iterable[Any]) -> tuple[Any, ...]:
-    """Casadi symbols among values, each once, in their order."""
-    symbols: dict[str, Any] = {}
-    for value in values:
-        if isinstance(value, ca.SX):
-            symbols.update((symbol.name(), symbol) for symbol in ca.symvar(value))
-    return tuple(symbols.values())
 
 
 @dataclass(frozen=True, kw_only=True)

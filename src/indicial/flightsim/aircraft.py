@@ -10,7 +10,8 @@ import casadi as ca
 
 from indicial.conventions import ReferenceQuantities
 from indicial.errors import InputError
-from indicial.flightsim.aerodynamics import AerodynamicLoads, FlowState, Validity, free_symbols
+from indicial.flightsim.aerodynamics import AerodynamicLoads, FlowState, Validity
+from indicial.flightsim.expressions import free_symbols
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,12 +3,15 @@ r"""One symbolic model of the motion of a rigid vehicle, for simulation, lineari
 State: position of the centre of gravity (earth axes), its velocity over the ground (body axes), attitude quaternion
 body -> earth (scalar first), body rates, aerodynamic lag states.
 
-    m (vdot + (omega + Omega) x v) = F + m R^T g            I omegadot + omega x I omega = M + r x F
-    xdot = R v            qdot = 1/2 q o (0, omega - Omega)
+    m (vdot + (omega + Omega) x v - omega x cdot) = F + m R^T g        I omegadot + omega x I omega = M + r x F
+    xdot = R (v + cdot)            qdot = 1/2 q o (0, omega - Omega)
 
 with F, M the aerodynamic loads about the moment reference point and r its arm from the centre of gravity; Omega the
 rotation of the earth (body axes), omega the body's in inertial space, g with the centrifugal acceleration. The air
-turns with the earth: the loads see omega - Omega.
+turns with the earth: the loads see omega - Omega, and the velocity less the wind.
+
+c is where the centre of gravity is in the body, which changes while mass burns, and v the velocity of the body's point
+that is there. Mass leaves with the velocity it has in the body, which takes no force; what throws it is a `Motor`.
 
 The rotation matrix is built from ``q/|q|``, so the motion does not depend on the quaternion's norm; and since qdot is
 linear in q, neither does any Runge-Kutta step. The norm may drift in the last digits and does no harm: no
@@ -22,9 +25,9 @@ mass matrix and nothing is lagged.
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -32,17 +35,22 @@ from numpy.typing import ArrayLike
 
 from indicial.conventions import Array
 from indicial.errors import InputError
-from indicial.flightsim.aerodynamics import Aerodynamics, FlowState
+from indicial.flightsim.aerodynamics import AerodynamicLoads, Aerodynamics, FlowState
 from indicial.flightsim.atmosphere import Air, Atmosphere, ConstantAtmosphere
 from indicial.flightsim.compiled import Kernel, compile_function
 from indicial.flightsim.earth import Earth, FlatEarth
+from indicial.flightsim.expressions import CONDITIONS, TIME, free_symbols
+from indicial.flightsim.forces import Force
 from indicial.flightsim.initial import InitialState
 from indicial.flightsim.vehicle import Vehicle
+from indicial.flightsim.wind import Wind
 
 POSITION, VELOCITY, QUATERNION, RATE = slice(0, 3), slice(3, 6), slice(6, 10), slice(10, 13)
 RIGID_STATES = ("x", "y", "z", "u", "v", "w", "q0", "q1", "q2", "q3", "p", "q", "r")
 
 _REST = 1e-9  # m/s; makes directions smooth at rest, below round-off of V from 0.1 m/s up
+
+_MASS_PROPERTIES = ["mass", "centre_of_gravity", "inertia"]
 
 _MAX_INNER_STEPS = 100_000  # of CVODES from one instant to the next
 
@@ -58,14 +66,16 @@ class Dynamics:
     derivative : casadi.Function
         (state, parameters, time [s]) -> time derivative of the state.
     loads : casadi.Function
-        (state, parameters, time) -> (force [N], moment about the centre of gravity [N m], density [kg/m^3], speed of
-        sound [m/s]), body axes.
+        (state, parameters, time) -> (aerodynamic force [N], its moment about the centre of gravity [N m], density
+        [kg/m^3], speed of sound [m/s], wind [m/s]), body axes.
     altitude : casadi.Function
         state -> geometric altitude [m].
     monitor : casadi.Function
         (state, parameters, time) -> what ends are asked of: x [m], altitude [m], climb rate [m/s].
+    mass_properties : casadi.Function
+        (parameters, time) -> (mass [kg], centre of gravity in mesh axes [m], inertia [kg m^2]).
     state_names, parameter_names : tuple of str
-        Parameters are the free symbols of the aerodynamic model, in its order.
+        Parameters are the free symbols of the aerodynamic model in its order, then those of the vehicle, then others.
     """
 
     vehicle: Vehicle
@@ -76,6 +86,7 @@ class Dynamics:
     loads: Any
     altitude: Any
     monitor: Any
+    mass_properties: Any
     state_names: tuple[str, ...]
     parameter_names: tuple[str, ...]
 
@@ -251,6 +262,8 @@ def build_dynamics(
     aerodynamics: Aerodynamics,
     atmosphere: Atmosphere | None = None,
     earth: Earth | None = None,
+    wind: Wind | None = None,
+    forces: Sequence[Force] = (),
 ) -> Dynamics:
     """The equations of motion as casadi functions of state and parameters.
 
@@ -260,14 +273,18 @@ def build_dynamics(
     aerodynamics : Aerodynamics
         Its loads, about its own moment reference point, are transferred to the centre of gravity exactly.
     atmosphere : Atmosphere, optional
-        Still air; `ConstantAtmosphere` at 20 C and 1 atm if not given.
+        `ConstantAtmosphere` at 20 C and 1 atm if not given.
     earth : Earth, optional
         `FlatEarth` if not given.
+    wind : Wind, optional
+        Still air if not given.
+    forces : sequence of Force
+        Motors and the like.
 
     Raises
     ------
     InputError
-        If the vehicle and the aerodynamic model differ in reference length or area.
+        If the vehicle and the aerodynamic model differ in reference length or area, or two symbols share a name.
     """
     _check_reference(vehicle, aerodynamics)
     atmosphere = ConstantAtmosphere() if atmosphere is None else atmosphere
@@ -275,54 +292,121 @@ def build_dynamics(
     state = ca.SX.sym("state", len(RIGID_STATES) + len(aerodynamics.lag_names))
     position, velocity, quaternion, rate = state[POSITION], state[VELOCITY], state[QUATERNION], state[RATE]
     lag = state[len(RIGID_STATES) :]
-    parameters = ca.vertcat(ca.SX(0, 1), *aerodynamics.parameters)
-    time = ca.SX.sym("time")
 
     rotation = _rotation(quaternion)
     altitude = earth.altitude(position)
     air = atmosphere.air(altitude)
-    arm = ca.DM(vehicle.arm_to(aerodynamics.reference.moment_reference))
     turning = ca.SX.sym("turning", 2)
     earth_rate = ca.mtimes(rotation.T, ca.sparsify(ca.DM(earth.rotation)))
     relative = rate - earth_rate
-    flow = _flow(air, velocity + ca.cross(relative, arm), relative, turning, rate)
-    force, moment = aerodynamics.loads(flow, lag)
-    moment = moment + ca.cross(arm, force)
+    over_ground = ca.mtimes(rotation, velocity + _drift(vehicle))
+    motion = _Motion(position, quaternion, over_ground, _quaternion_rate(quaternion, relative))
+    blowing, wind_rate, air_turning = _wind(wind, motion, altitude, rotation)
+    arm = vehicle.arm_to(aerodynamics.reference.moment_reference)
+    through_air = velocity + ca.cross(relative, arm) - blowing
+    flow = _flow(air, through_air, relative - air_turning, turning, rate)
+    load, about_point = aerodynamics.loads(flow, lag)
+    aerodynamic = AerodynamicLoads(load, about_point + ca.cross(arm, load))
+    here = _flow(air, velocity - blowing, relative - air_turning, turning, rate)
+    acting = [aerodynamic, *(force.loads(here, vehicle) for force in forces)]
+    force, moment = (_sum(part) for part in zip(*acting, strict=True))
 
-    inertia = ca.sparsify(ca.DM(vehicle.inertia))
-    inverse = ca.sparsify(ca.DM(np.linalg.inv(vehicle.inertia)))
+    inertia = ca.sparsify(ca.SX(vehicle.inertia))
     gravity = ca.mtimes(rotation.T, earth.gravity(position))
-    acceleration = force / vehicle.mass + gravity - ca.cross(rate + earth_rate, velocity)
-    turn_rate = ca.mtimes(inverse, moment - ca.cross(rate, ca.mtimes(inertia, rate)))
+    acceleration = (
+        force / vehicle.mass + gravity - ca.cross(rate + earth_rate, velocity) + ca.cross(rate, _drift(vehicle))
+    )
+    turn_rate = ca.mtimes(_inverse(vehicle.inertia), moment - ca.cross(rate, ca.mtimes(inertia, rate)))
     relative_turn_rate = turn_rate + ca.cross(relative, earth_rate)
+    # of the moment reference point through the air: what the centre of gravity drifts, the arm loses
+    quickening = acceleration - ca.cross(relative, _drift(vehicle)) + ca.cross(relative_turn_rate, arm) - wind_rate
 
-    solution = _solve_turning(
-        turning, flow, velocity + ca.cross(relative, arm), acceleration + ca.cross(relative_turn_rate, arm)
-    )
+    solution = _solve_turning(turning, flow, through_air, quickening)
     derivative = ca.vertcat(
-        ca.mtimes(rotation, velocity),
-        acceleration,
-        _quaternion_rate(quaternion, relative),
-        turn_rate,
-        aerodynamics.lag_rate(flow, lag),
+        over_ground, acceleration, motion.quaternion_rate, turn_rate, aerodynamics.lag_rate(flow, lag)
     )
-    derivative, force, moment = ca.substitute([derivative, force, moment], [turning], [solution])
-    inputs, names = [state, parameters, time], ["state", "parameters", "time"]
-    climb = ca.jtimes(altitude, position, ca.mtimes(rotation, velocity))
-    monitor = ca.densify(ca.vertcat(position[0], altitude, climb))
-    outputs = [force, moment, flow.density, flow.speed_of_sound]
+    found = [derivative, *aerodynamic]
+    found = ca.substitute(found, [turning], [solution])
+    monitor = ca.vertcat(position[0], altitude, ca.jtimes(altitude, position, over_ground))
+    outputs = [*found, flow.density, flow.speed_of_sound, blowing, monitor, altitude, *_mass_properties(vehicle)]
+    outputs = ca.substitute([ca.densify(o) for o in outputs], list(CONDITIONS), _conditions(flow, altitude))
+    symbols = _parameters(aerodynamics, vehicle, state, outputs)
+    inputs, names = [state, ca.vertcat(ca.SX(0, 1), *symbols), TIME], ["state", "parameters", "time"]
+    derivative, *loads, monitor, altitude, mass, centre, tensor = outputs
     return Dynamics(
         vehicle=vehicle,
         aerodynamics=aerodynamics,
         atmosphere=atmosphere,
         earth=earth,
-        derivative=ca.Function("derivative", inputs, [ca.densify(derivative)], names, ["derivative"]),
-        loads=ca.Function("loads", inputs, [ca.densify(o) for o in outputs], names, ["force", "moment", "rho", "a"]),
+        derivative=ca.Function("derivative", inputs, [derivative], names, ["derivative"]),
+        loads=ca.Function("loads", inputs, loads, names, ["force", "moment", "rho", "a", "wind"]),
         altitude=ca.Function("altitude", [state], [altitude], ["state"], ["altitude"]),
         monitor=ca.Function("monitor", inputs, [monitor], names, ["monitored"]),
+        mass_properties=ca.Function("mass_properties", inputs[1:], [mass, centre, tensor], names[1:], _MASS_PROPERTIES),
         state_names=(*RIGID_STATES, *aerodynamics.lag_names),
-        parameter_names=tuple(symbol.name() for symbol in aerodynamics.parameters),
+        parameter_names=tuple(symbol.name() for symbol in symbols),
     )
+
+
+class _Motion(NamedTuple):
+    """Where the vehicle is and how that changes."""
+
+    position: Any
+    quaternion: Any
+    position_rate: Any
+    quaternion_rate: Any
+
+
+def _wind(wind: Wind | None, motion: _Motion, altitude: Any, rotation: Any) -> tuple[Any, Any, Any]:
+    """Velocity of the air in body axes, its rate of change there, and its turning rate."""
+    if wind is None:
+        return ca.SX.zeros(3), ca.SX.zeros(3), ca.SX.zeros(3)
+    blowing = ca.mtimes(rotation.T, wind.velocity(motion.position, altitude))
+    turning = wind.rotation(motion.position, altitude)
+    change = (
+        ca.jtimes(blowing, motion.position, motion.position_rate)
+        + ca.jtimes(blowing, motion.quaternion, motion.quaternion_rate)
+        + ca.jacobian(blowing, TIME)
+    )
+    return blowing, change, ca.SX.zeros(3) if turning is None else ca.mtimes(rotation.T, turning)
+
+
+def _drift(vehicle: Vehicle) -> Any:
+    """Velocity of the centre of gravity in the body as mass burns, body axes [m/s]."""
+    return -ca.jacobian(vehicle.arm_to((0.0, 0.0, 0.0)), TIME)
+
+
+def _conditions(flow: FlowState, altitude: Any) -> list[Any]:
+    """What stands for each of `CONDITIONS`."""
+    u, v, w = ca.vertsplit(flow.velocity)
+    across = ca.sqrt(v * v + w * w + _REST**2)
+    # at rest angles are 0, and their slopes finite
+    angles = [ca.atan2(w, u + _REST), ca.asin(v / flow.speed), ca.atan2(across, u + _REST)]
+    return [altitude, flow.speed / flow.speed_of_sound, *angles]
+
+
+def _inverse(inertia: Any) -> Any:
+    if isinstance(inertia, ca.SX):
+        return ca.inv_minor(inertia)
+    return ca.sparsify(ca.DM(np.linalg.inv(inertia)))
+
+
+def _mass_properties(vehicle: Vehicle) -> tuple[Any, Any, Any]:
+    return ca.SX(vehicle.mass), ca.vertcat(*(ca.SX(c) for c in vehicle.centre_of_gravity)), ca.SX(vehicle.inertia)
+
+
+def _parameters(aerodynamics: Aerodynamics, vehicle: Vehicle, state: Any, outputs: list[Any]) -> tuple[Any, ...]:
+    """Free symbols: those of the aerodynamic model, of the vehicle, then of all else."""
+    own = {symbol.name() for symbol in ca.symvar(state)}
+    rest = (symbol for symbol in ca.symvar(ca.veccat(*outputs)) if symbol.name() not in own)
+    return free_symbols((*aerodynamics.parameters, *vehicle.parameters, *rest))
+
+
+def _sum(vectors: Iterable[Any]) -> Any:
+    first, *others = vectors
+    for other in others:
+        first = first + other
+    return first
 
 
 def _check_reference(vehicle: Vehicle, aerodynamics: Aerodynamics) -> None:

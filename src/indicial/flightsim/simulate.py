@@ -203,7 +203,8 @@ def suggest_method(every: int) -> Method:
 def record(dynamics: Dynamics, time: Array, states: Array, parameters: Array, provenance: dict[str, Any]) -> Trajectory:
     """The trajectory of states (n, nx), with loads evaluated and range checked."""
     outputs = dynamics.loads(states.T, np.tile(parameters[:, None], (1, len(time))), time[None, :])
-    force, moment, density, sound = (np.array(output).T for output in outputs)
+    force, moment, density, sound, wind = (np.array(output).T for output in outputs)
+    x, y, z = np.array(dynamics.mass_properties(parameters, time[0])[1]).ravel().tolist()
     quaternion = states[:, QUATERNION] / np.linalg.norm(states[:, QUATERNION], axis=1, keepdims=True)
     trajectory = Trajectory(
         time=time,
@@ -217,9 +218,10 @@ def record(dynamics: Dynamics, time: Array, states: Array, parameters: Array, pr
         speed_of_sound=sound.ravel(),
         lag=states[:, 13:],
         outside_range=np.zeros(len(time), dtype=bool),
-        reference=dynamics.vehicle.reference.about(dynamics.vehicle.centre_of_gravity),
+        reference=dynamics.vehicle.reference.about((x, y, z)),
         lag_names=dynamics.state_names[13:],
         provenance={"vehicle": dynamics.vehicle.name, **provenance},
+        wind=wind,
     )
     outside = _outside(dynamics, trajectory, states)
     if np.any(outside):

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 FORMAT = "indicial trajectory"
 
 _COLUMNS = {
@@ -32,8 +32,13 @@ _COLUMNS = {
     "rate": ("p_rad_s", "q_rad_s", "r_rad_s"),
     "force": ("force_x_n", "force_y_n", "force_z_n"),
     "moment": ("moment_x_n_m", "moment_y_n_m", "moment_z_n_m"),
+    "wind": ("wind_u_m_s", "wind_v_m_s", "wind_w_m_s"),
 }
-_UNITS = {"position": "m", "velocity": "m/s", "quaternion": "1", "rate": "rad/s", "force": "N", "moment": "N m"}
+_UNITS = {"position": "m", "velocity": "m/s", "quaternion": "1", "rate": "rad/s"} | {
+    "force": "N",
+    "moment": "N m",
+    "wind": "m/s",
+}
 _AXES = {"position": "earth", "quaternion": "body to earth"}
 _ANGLES_DEG = {"alpha_deg": "alpha", "beta_deg": "beta", "total_angle_deg": "total_angle"}
 
@@ -49,7 +54,7 @@ class Trajectory:
     position : ndarray
         Centre of gravity, earth axes x downrange, y right, z down [m], shape (n, 3).
     velocity : ndarray
-        Of the centre of gravity, body axes [m/s], shape (n, 3).
+        Of the centre of gravity over the ground, body axes [m/s], shape (n, 3).
     quaternion : ndarray
         Unit, scalar first, body -> earth, shape (n, 4).
     rate : ndarray
@@ -66,6 +71,8 @@ class Trajectory:
     lag_names : tuple of str
     provenance : dict
         How it was made: vehicle, method, step, error estimate (plain values).
+    wind : ndarray, optional
+        Velocity of the air over the ground, body axes [m/s], shape (n, 3); still air if not given.
     """
 
     time: Array
@@ -82,9 +89,12 @@ class Trajectory:
     reference: ReferenceQuantities
     lag_names: tuple[str, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
+    wind: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
         n = np.size(self.time)
+        if np.size(self.wind) == 0:
+            object.__setattr__(self, "wind", np.zeros((n, 3)))
         shapes = {"time": (n,), "density": (n,), "speed_of_sound": (n,), "lag": (n, len(self.lag_names))}
         shapes |= {name: (n, len(columns)) for name, columns in _COLUMNS.items()}
         for name, shape in shapes.items():
@@ -100,24 +110,29 @@ class Trajectory:
         return int(self.time.size)
 
     @property
+    def air_velocity(self) -> Array:
+        """Of the centre of gravity through the air, body axes [m/s], shape (n, 3)."""
+        return self.velocity - self.wind
+
+    @property
     def speed(self) -> Array:
-        """V of the centre of gravity [m/s]."""
-        return flow_angles(self.velocity)[0]
+        """V of the centre of gravity through the air [m/s]."""
+        return flow_angles(self.air_velocity)[0]
 
     @property
     def alpha(self) -> Array:
         """``atan2(w, u)`` [rad]."""
-        return flow_angles(self.velocity)[1]
+        return flow_angles(self.air_velocity)[1]
 
     @property
     def beta(self) -> Array:
         """``asin(v/V)`` [rad]."""
-        return flow_angles(self.velocity)[2]
+        return flow_angles(self.air_velocity)[2]
 
     @property
     def total_angle(self) -> Array:
-        """Angle between the body's x axis and the velocity [rad]."""
-        u, v, w = self.velocity.T
+        """Angle between the body's x axis and the velocity through the air [rad]."""
+        u, v, w = self.air_velocity.T
         angle: Array = np.arctan2(np.hypot(v, w), u)
         return angle
 
@@ -152,7 +167,8 @@ class Trajectory:
 
         if len(self) < 2:
             return np.zeros(len(self))
-        length: Array = CubicSpline(self.time, self.speed).antiderivative()(self.time)
+        over_ground = np.linalg.norm(self.velocity, axis=1)
+        length: Array = CubicSpline(self.time, over_ground).antiderivative()(self.time)
         return length
 
     @property
@@ -161,7 +177,7 @@ class Trajectory:
         from scipy.interpolate import CubicSpline
 
         turned = CubicSpline(self.time, self.rate[:, 0]).antiderivative()(self.time) if len(self) > 1 else 0.0
-        incidence = self.velocity[:, 1] + 1j * self.velocity[:, 2]
+        incidence = self.air_velocity[:, 1] + 1j * self.air_velocity[:, 2]
         speed = self.speed
         return np.divide(incidence, speed, out=np.zeros_like(incidence), where=speed > 0.0) * np.exp(1j * turned)
 

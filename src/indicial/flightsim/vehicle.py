@@ -4,23 +4,29 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
+import casadi as ca
 import numpy as np
 
-from indicial.conventions import Array, ReferenceQuantities, body_from_mesh
+from indicial.conventions import Array, ReferenceQuantities
 from indicial.errors import InputError
+from indicial.flightsim.expressions import free_symbols, is_number
 
 
 @dataclass(frozen=True)
 class Vehicle:
     """A rigid body that flies.
 
+    Mass, inertia and centre of gravity may be casadi expressions: of `TIME` for a vehicle that burns, of symbols for
+    one whose masses are varied. Mass that leaves does so without being thrown; a `Motor` throws it.
+
     Parameters
     ----------
     name : str
-    mass : float
+    mass : float or casadi expression
         m [kg].
-    inertia : ndarray
+    inertia : ndarray or casadi expression
         Inertia tensor about the centre of gravity [kg m^2], body axes (x forward, y right, z down), shape (3, 3);
         off-diagonal elements are minus the products of inertia.
     reference : ReferenceQuantities
@@ -36,14 +42,18 @@ class Vehicle:
     """
 
     name: str
-    mass: float
-    inertia: Array
+    mass: Any
+    inertia: Any
     reference: ReferenceQuantities
-    centre_of_gravity: tuple[float, float, float]
+    centre_of_gravity: tuple[Any, Any, Any]
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.mass) and self.mass > 0.0):
+        if is_number(self.mass) and not (math.isfinite(self.mass) and self.mass > 0.0):
             raise InputError(f"mass of {self.name} is {self.mass} kg, must be positive and finite")
+        if isinstance(self.inertia, ca.SX):
+            if self.inertia.shape != (3, 3):
+                raise InputError(f"inertia of {self.name} must be of shape (3, 3), not {self.inertia.shape}")
+            return
         tensor = np.array(self.inertia, dtype=float)
         if tensor.shape != (3, 3) or not np.all(np.isfinite(tensor)):
             raise InputError(f"inertia of {self.name} must be a finite tensor of shape (3, 3), not {tensor.shape}")
@@ -58,12 +68,21 @@ class Vehicle:
         tensor.setflags(write=False)
         object.__setattr__(self, "inertia", tensor)
 
-    def arm_to(self, point: tuple[float, float, float]) -> Array:
-        """From the centre of gravity to `point` (mesh axes [m]), in body axes [m], shape (3,)."""
-        return body_from_mesh(np.asarray(point) - np.asarray(self.centre_of_gravity))
+    @property
+    def parameters(self) -> tuple[Any, ...]:
+        """Free casadi symbols of mass, inertia and centre of gravity."""
+        return free_symbols((self.mass, self.inertia, *self.centre_of_gravity))
+
+    def arm_to(self, point: tuple[float, float, float]) -> Any:
+        """From the centre of gravity to `point` (mesh axes [m]), in body axes [m], casadi shape (3, 1)."""
+        aft, right, up = (ca.SX(p) - c for p, c in zip(point, self.centre_of_gravity, strict=True))
+        return ca.vertcat(-aft, right, -up)
 
     def summary(self) -> str:
         """Mass properties in two lines."""
+        if isinstance(self.inertia, ca.SX) or not all(is_number(v) for v in (self.mass, *self.centre_of_gravity)):
+            names = ", ".join(symbol.name() for symbol in self.parameters) or "TIME"
+            return f"{self.name}: mass properties that depend on {names}"
         ix, iy, iz = np.diag(self.inertia)
         x, y, z = self.centre_of_gravity
         return (
