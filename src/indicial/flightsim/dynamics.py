@@ -42,6 +42,7 @@ from indicial.flightsim.earth import Earth, FlatEarth
 from indicial.flightsim.expressions import CONDITIONS, TIME, free_symbols
 from indicial.flightsim.forces import Force
 from indicial.flightsim.initial import InitialState
+from indicial.flightsim.signals import Schedule
 from indicial.flightsim.vehicle import Vehicle
 from indicial.flightsim.wind import Wind
 
@@ -61,7 +62,7 @@ class Dynamics:
 
     Parameters
     ----------
-    vehicle, aerodynamics, atmosphere, earth
+    vehicle, aerodynamics, atmosphere, earth, wind
         What the model is made of.
     derivative : casadi.Function
         (state, parameters, time [s]) -> time derivative of the state.
@@ -82,6 +83,7 @@ class Dynamics:
     aerodynamics: Aerodynamics
     atmosphere: Atmosphere
     earth: Earth
+    wind: Wind | None
     derivative: Any
     loads: Any
     altitude: Any
@@ -130,14 +132,9 @@ class Dynamics:
         Raises
         ------
         InputError
-            If one is missing or unknown.
+            If one is missing, unknown or not finite.
         """
-        values = dict(parameters or {})
-        if set(values) != set(self.parameter_names):
-            raise InputError(
-                f"parameters given are ({', '.join(values)}), the model's are ({', '.join(self.parameter_names)})"
-            )
-        return np.array([values[name] for name in self.parameter_names])
+        return Schedule.of(self.parameter_names, parameters).at(0.0)[:, 0]
 
     def initial_vector(self, initial: InitialState, parameters: ArrayLike = ()) -> Array:
         """State vector of an initial state, its lag states settled if they are not given.
@@ -338,6 +335,7 @@ def build_dynamics(
         aerodynamics=aerodynamics,
         atmosphere=atmosphere,
         earth=earth,
+        wind=wind,
         derivative=ca.Function("derivative", inputs, [derivative], names, ["derivative"]),
         loads=ca.Function("loads", inputs, loads, names, ["force", "moment", "rho", "a", "wind"]),
         altitude=ca.Function("altitude", [state], [altitude], ["state"], ["altitude"]),

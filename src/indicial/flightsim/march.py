@@ -4,6 +4,9 @@ A rate of change and a monitor (see `Dynamics`) come in as the addresses of comp
 march serves every model; it holds no Python object and can run in several threads at once. Ends are rows
 ``(monitored quantity, sign, level)``: a flight ends where ``sign (quantity - level)`` falls to zero.
 
+Parameters that are signals are written into the vector of parameters before every evaluation; at a jump, the stages at
+the end of a step see what was before it and those at its beginning what comes after.
+
 Runge-Kutta of fourth order with fixed steps, and DOP853 of Dormand and Prince: order 8, error by orders 5 and 3, dense
 output of order 7, with the coefficients that SciPy has. Source: Hairer, Norsett and Wanner, Solving Ordinary
 Differential Equations I, sec. II.4 to II.6 and II.10.
@@ -17,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from indicial.conventions import Array
 from indicial.flightsim.compiled import Code, evaluate_code
@@ -28,7 +32,22 @@ FLOWN, ENDED, NOT_FINITE, TOO_MANY_STEPS = 0, 1, 2, 3
 """How a march came out: to its duration, at an end, or not."""
 
 _BISECTIONS = 200
+_NUDGE = 1e-9  # of a step: what times of steps and of jumps may differ by in round-off
 _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 10.0
+
+
+class Drive(NamedTuple):
+    """Parameters that are signals, as arrays that compiled code takes."""
+
+    which: NDArray[np.int64]
+    """Parameter that each one drives, shape (n,)."""
+    first: NDArray[np.int64]
+    """Where each one's points begin, and where the last one's end, shape (n + 1,)."""
+    time: Array
+    """Of all points [s], one signal after the other."""
+    value: Array
+    breaks: Array
+    """Times of all points, each once, increasing: the adaptive march stops at them."""
 
 
 class Tableau(NamedTuple):
@@ -60,8 +79,32 @@ def dop853() -> Tableau:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
-def _margin(monitor: Code, y: Array, parameters: Array, time: float, ends: Array, seen: Array) -> float:
+def _feed(drive: Drive, time: float, nudge: float, parameters: Array) -> None:
+    """Write the signals' values into the parameters, from their pieces at ``time + nudge``: a side of a jump."""
+    for j in range(drive.which.size):
+        start, stop = drive.first[j], drive.first[j + 1]
+        low, high = start, stop  # the first point beyond `time` is sought
+        while low < high:
+            middle = (low + high) // 2
+            if drive.time[middle] <= time + nudge:
+                low = middle + 1
+            else:
+                high = middle
+        if low == start:
+            value = drive.value[start]
+        elif low == stop:
+            value = drive.value[stop - 1]
+        else:
+            t0, t1 = drive.time[low - 1], drive.time[low]
+            share = (time - t0) / (t1 - t0)
+            value = drive.value[low - 1] + share * (drive.value[low] - drive.value[low - 1])
+        parameters[drive.which[j]] = value
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+def _margin(monitor: Code, y: Array, parameters: Array, drive: Drive, time: float, ends: Array, seen: Array) -> float:
     """What is left until the nearest end."""
+    _feed(drive, time, 0.0, parameters)
     evaluate_code(monitor, y, parameters, time, seen)
     left = math.inf
     for row in ends:
@@ -78,14 +121,18 @@ def _finite(y: Array) -> bool:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
-def _step(rate: Code, y: Array, parameters: Array, time: float, h: float, k: Array, stage: Array, after: Array) -> None:
+def _step(
+    rate: Code, y: Array, parameters: Array, drive: Drive, time: float, h: float, k: Array, stage: Array, after: Array
+) -> None:
     """One step of the classical Runge-Kutta method of order 4, from `y` to `after`."""
     n = y.size
     half, sixth = 0.5 * h, h / 6.0
+    _feed(drive, time, _NUDGE * h, parameters)
     evaluate_code(rate, y, parameters, time, k)
     for i in range(n):
         after[i] = y[i] + sixth * k[i]
         stage[i] = y[i] + half * k[i]
+    _feed(drive, time + half, 0.0, parameters)
     evaluate_code(rate, stage, parameters, time + half, k)
     for i in range(n):
         after[i] += 2.0 * sixth * k[i]
@@ -94,6 +141,7 @@ def _step(rate: Code, y: Array, parameters: Array, time: float, h: float, k: Arr
     for i in range(n):
         after[i] += 2.0 * sixth * k[i]
         stage[i] = y[i] + h * k[i]
+    _feed(drive, time + h, -_NUDGE * h, parameters)
     evaluate_code(rate, stage, parameters, time + h, k)
     for i in range(n):
         after[i] += sixth * k[i]
@@ -105,6 +153,7 @@ def runge_kutta(
     monitor: Code,
     start: Array,
     parameters: Array,
+    drive: Drive,
     duration: float,
     step: float,
     every: int,
@@ -120,6 +169,8 @@ def runge_kutta(
     start : ndarray
         Shape (nx,).
     parameters : ndarray
+    drive : Drive
+        Those of the parameters that are signals.
     duration, step : float
         [s].
     every : int
@@ -137,6 +188,7 @@ def runge_kutta(
         `FLOWN`, `ENDED`, or `NOT_FINITE` (the last instant kept is the last good one).
     """
     y, after, k, stage, seen = start.copy(), start.copy(), start.copy(), start.copy(), np.empty(3)
+    p = parameters.copy()
     whole = math.floor(duration / step * (1.0 + 1e-12))
     steps = whole if duration - whole * step < 1e-9 * step else whole + 1
     times[0], kept = 0.0, 1
@@ -144,22 +196,22 @@ def runge_kutta(
     for index in range(1, steps + 1):
         before = (index - 1) * step
         h = step if index <= whole else duration - before
-        _step(rate, y, parameters, before, h, k, stage, after)
+        _step(rate, y, p, drive, before, h, k, stage, after)
         if not _finite(after):
             times[kept], states[kept] = before, y
             return kept + 1 if before > times[kept - 1] else kept, NOT_FINITE
-        if ends.size and _margin(monitor, after, parameters, before + h, ends, seen) <= 0.0:
+        if ends.size and _margin(monitor, after, p, drive, before + h, ends, seen) <= 0.0:
             low, high = 0.0, h
             for _ in range(_BISECTIONS):
                 middle = 0.5 * (low + high)
                 if middle <= low or middle >= high or high - low < 1e-15 * h:
                     break
-                _step(rate, y, parameters, before, middle, k, stage, after)
-                if _margin(monitor, after, parameters, before + middle, ends, seen) > 0.0:
+                _step(rate, y, p, drive, before, middle, k, stage, after)
+                if _margin(monitor, after, p, drive, before + middle, ends, seen) > 0.0:
                     low = middle
                 else:
                     high = middle
-            _step(rate, y, parameters, before, high, k, stage, after)
+            _step(rate, y, p, drive, before, high, k, stage, after)
             times[kept], states[kept] = before + high, after
             return kept + 1, ENDED
         y, after = after, y
@@ -174,6 +226,7 @@ def _stages(
     rate: Code,
     y: Array,
     parameters: Array,
+    drive: Drive,
     time: float,
     h: float,
     tableau: Tableau,
@@ -193,6 +246,8 @@ def _stages(
                     stage[i] += weight * k[j, i]
         for i in range(n):
             stage[i] = y[i] + h * stage[i]
+        nudge = -_NUDGE * h if tableau.c[s] == 1.0 else 0.0
+        _feed(drive, time + tableau.c[s] * h, nudge, parameters)
         evaluate_code(rate, stage, parameters, time + tableau.c[s] * h, k[s])
 
 
@@ -260,8 +315,10 @@ def adaptive(
     monitor: Code,
     start: Array,
     parameters: Array,
+    drive: Drive,
     instants: Array,
     tolerance: tuple[float, Array],
+    largest: float,
     ends: Array,
     tableau: Tableau,
     limit: int,
@@ -272,12 +329,14 @@ def adaptive(
 
     Parameters
     ----------
-    rate, monitor, start, parameters, ends
+    rate, monitor, start, parameters, drive, ends
         As those of `runge_kutta`.
     instants : ndarray
         Increasing [s], from the start at ``instants[0]`` on, shape (n,).
     tolerance : tuple
         Relative, and absolute of each state, shape (nx,).
+    largest : float
+        Longest step that it may take [s].
     tableau : Tableau
     limit : int
         Steps that it may take.
@@ -291,25 +350,35 @@ def adaptive(
     relative, absolute = tolerance
     y, after, here, seen = start.copy(), start.copy(), start.copy(), np.empty(3)
     n = y.size
-    k, f = np.zeros((16, n)), np.empty((7, n))
+    k, f, p = np.zeros((16, n)), np.empty((7, n)), parameters.copy()
     time, duration = instants[0], instants[-1] - instants[0]
-    evaluate_code(rate, y, parameters, time, k[0])
-    h = _first_step(rate, y, parameters, k, relative, absolute, duration)
+    _feed(drive, time, 0.0, p)
+    evaluate_code(rate, y, p, time, k[0])
+    h = _first_step(rate, y, p, k, relative, absolute, duration)
     times[0], kept, steps, rejected = time, 1, 0, False
     states[0] = y
+    coming = 0  # of the breaks
+    while coming < drive.breaks.size and drive.breaks[coming] <= time:
+        coming += 1
     while kept < instants.size:
         steps += 1
         if steps > limit:
             return kept, TOO_MANY_STEPS, steps
-        last = time + h >= instants[-1] or instants[-1] - time - h < 1e-3 * h
-        h = instants[-1] - time if last else h
-        _stages(rate, y, parameters, time, h, tableau, k, (1, 12))
+        h = min(h, largest)
+        stop_at = instants[-1]
+        if coming < drive.breaks.size:
+            stop_at = min(stop_at, drive.breaks[coming])
+        reaching = time + h >= stop_at or stop_at - time - h < 1e-3 * h
+        last = reaching and stop_at == instants[-1]
+        h = stop_at - time if reaching else h
+        _stages(rate, y, p, drive, time, h, tableau, k, (1, 12))
         for i in range(n):
             total = 0.0
             for j in range(12):
                 total += tableau.b[j] * k[j, i]
             after[i] = y[i] + h * total
-        evaluate_code(rate, after, parameters, time + h, k[12])
+        _feed(drive, time + h, -_NUDGE * h, p)
+        evaluate_code(rate, after, p, time + h, k[12])
         error = _error(y, after, h, k, tableau.error, relative, absolute)
         if not error < 1.0:  # too large, or not a number
             h *= max(_SHRINK, _SAFETY * error**-0.125) if error < math.inf else _SHRINK
@@ -317,9 +386,9 @@ def adaptive(
             if not h > 1e-15 * max(abs(time), duration):
                 return kept, NOT_FINITE, steps
             continue
-        ended = ends.size > 0 and _margin(monitor, after, parameters, time + h, ends, seen) <= 0.0
+        ended = ends.size > 0 and _margin(monitor, after, p, drive, time + h, ends, seen) <= 0.0
         if ended or time + h >= instants[kept]:
-            _stages(rate, y, parameters, time, h, tableau, k, (13, 16))
+            _stages(rate, y, p, drive, time, h, tableau, k, (13, 16))
             _prepare_dense(y, after, h, k, tableau.dense, f)
         stop = 1.0
         if ended:
@@ -329,7 +398,7 @@ def adaptive(
                 if middle <= low or middle >= stop:
                     break
                 _interpolate(y, f, middle, here)
-                if _margin(monitor, here, parameters, time + middle * h, ends, seen) > 0.0:
+                if _margin(monitor, here, p, drive, time + middle * h, ends, seen) > 0.0:
                     low = middle
                 else:
                     stop = middle
@@ -344,11 +413,15 @@ def adaptive(
                 times[kept] = reached
                 kept += 1
             return kept, ENDED, steps
-        time += h
+        time = stop_at if reaching else time + h
         grow = _GROW if error == 0.0 else min(_GROW, _SAFETY * error**-0.125)
         h *= min(1.0, grow) if rejected else grow
         rejected = False
         y, after = after, y
         for i in range(n):
             k[0, i] = k[12, i]
+        if coming < drive.breaks.size and time == drive.breaks[coming]:
+            coming += 1
+            _feed(drive, time, 0.0, p)
+            evaluate_code(rate, y, p, time, k[0])  # as it is after the break
     return kept, FLOWN, steps

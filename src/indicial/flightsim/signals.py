@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
 
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from indicial.conventions import Array
 from indicial.errors import InputError
+from indicial.flightsim.march import Drive
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -119,3 +121,58 @@ class Signal:
         ax.plot(self.time, self.value)
         ax.set(xlabel="time [s]", ylabel="value")
         return figure
+
+
+Parameters = Mapping[str, "float | Signal"]
+"""Values of a model's parameters: numbers, or functions of time."""
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """The parameters of one flight, in the model's order: numbers and signals.
+
+    Parameters
+    ----------
+    names : tuple of str
+    values : tuple of float or Signal
+    """
+
+    names: tuple[str, ...]
+    values: tuple[float | Signal, ...]
+
+    @classmethod
+    def of(cls, names: Sequence[str], given: Parameters | None) -> Self:
+        """One value for each name.
+
+        Raises
+        ------
+        InputError
+            If one is missing, unknown, or not a finite number.
+        """
+        values = dict(given or {})
+        if set(values) != set(names):
+            raise InputError(f"parameters given are ({', '.join(values)}), the model's are ({', '.join(names)})")
+        for name, value in values.items():
+            if not isinstance(value, Signal) and not math.isfinite(value):
+                raise InputError(f"parameter {name} is {value}, must be finite")
+        return cls(tuple(names), tuple(values[name] for name in names))
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Names of those that change with time."""
+        return tuple(n for n, value in zip(self.names, self.values, strict=True) if isinstance(value, Signal))
+
+    def at(self, times: ArrayLike) -> Array:
+        """All values at times [s], shape (n_parameters, n)."""
+        t = np.atleast_1d(np.asarray(times, dtype=float))
+        rows = [v.at(t) if isinstance(v, Signal) else np.full(t.size, float(v)) for v in self.values]
+        return np.array(rows, dtype=float).reshape(len(rows), t.size)
+
+    @property
+    def drive(self) -> Drive:
+        """The signals as the march takes them."""
+        signals = [(i, v) for i, v in enumerate(self.values) if isinstance(v, Signal)]
+        first = np.concatenate([[0], np.cumsum([v.time.size for _, v in signals])]).astype(np.int64)
+        time = np.concatenate([np.zeros(0), *(v.time for _, v in signals)])
+        value = np.concatenate([np.zeros(0), *(v.value for _, v in signals)])
+        return Drive(np.array([i for i, _ in signals], dtype=np.int64), first, time, value, np.unique(time))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
@@ -17,10 +17,13 @@ from indicial.flightsim.aerodynamics import Aerodynamics
 from indicial.flightsim.atmosphere import Atmosphere
 from indicial.flightsim.dynamics import POSITION, QUATERNION, RATE, VELOCITY, Dynamics, build_dynamics
 from indicial.flightsim.earth import Earth
+from indicial.flightsim.forces import Force
 from indicial.flightsim.initial import InitialState
 from indicial.flightsim.march import NOT_FINITE, TOO_MANY_STEPS, adaptive, dop853, runge_kutta
+from indicial.flightsim.signals import Parameters, Schedule
 from indicial.flightsim.trajectory import Trajectory
 from indicial.flightsim.vehicle import Vehicle
+from indicial.flightsim.wind import Wind
 
 log = logging.getLogger(__name__)
 
@@ -67,7 +70,10 @@ class End:
         return np.array(rows, dtype=float).reshape(len(rows), 3)
 
     def margins(self, dynamics: Dynamics, states: Array, parameters: Array) -> Array:
-        """What is left until each end [m, m, m/s], shape (n_ends, n), negative once passed; states are (n, nx)."""
+        """What is left until each end [m, m, m/s], shape (n_ends, n), negative once passed; states are (n, nx).
+
+        Parameters hold for all states.
+        """
         values = np.tile(parameters[:, None], (1, len(states)))
         seen = np.array(dynamics.monitor(states.T, values, 0.0))
         rows = self.rows
@@ -87,12 +93,23 @@ def simulate(
     method: Method | None = None,
     atmosphere: Atmosphere | None = None,
     earth: Earth | None = None,
+    wind: Wind | None = None,
+    forces: Sequence[Force] = (),
+    parameters: Parameters | None = None,
     estimate_error: bool = True,
 ) -> Trajectory:
     """Fly a vehicle: `build_dynamics`, then `fly`."""
-    dynamics = build_dynamics(vehicle, aerodynamics, atmosphere, earth)
+    dynamics = build_dynamics(vehicle, aerodynamics, atmosphere, earth, wind, forces)
     return fly(
-        dynamics, initial, duration, step=step, every=every, end=end, method=method, estimate_error=estimate_error
+        dynamics,
+        initial,
+        duration,
+        step=step,
+        every=every,
+        end=end,
+        method=method,
+        parameters=parameters,
+        estimate_error=estimate_error,
     )
 
 
@@ -105,7 +122,7 @@ def fly(
     every: int | None = None,
     end: End | None = None,
     method: Method | None = None,
-    parameters: Mapping[str, float] | None = None,
+    parameters: Parameters | None = None,
     estimate_error: bool = True,
     tolerance: float = TOLERANCE,
 ) -> Trajectory:
@@ -131,7 +148,8 @@ def fly(
         Relative, of the adaptive methods; the absolute one is a hundredth of it (times the state's size at the start,
         where that is larger than 1).
     parameters : mapping, optional
-        Values of the model's free symbols.
+        Values of the model's free symbols: numbers, or a `Signal` for one that changes with time, such as a control.
+        "dop853" stops at each point of a signal; the steps of "rk4" go over it, and lose order unless they meet it.
     estimate_error : bool
         Fly again and record the error of the flight returned in the provenance: "rk4" with half the step, 16/15 of
         the difference; the others with a hundredth of the tolerance, the difference.
@@ -145,11 +163,13 @@ def fly(
     """
     if not (math.isfinite(duration) and duration > 0.0):
         raise InputError(f"flight duration is {duration} s, must be positive and finite")
-    values = dynamics.parameter_vector(parameters)
+    schedule = Schedule.of(dynamics.parameter_names, parameters)
+    values = schedule.at(0.0)[:, 0]
     start = dynamics.initial_vector(initial, values)
     if step is None:
         step, kept = suggest_step(dynamics, start, values, duration)
-        method = suggest_method(kept) if method is None else method
+        if method is None:
+            method = "dop853" if schedule.signals else suggest_method(kept)
     else:
         kept = 1
         method = "rk4" if method is None else method
@@ -163,7 +183,7 @@ def fly(
     end = End() if end is None else end
     if end.margins(dynamics, start[None, :], values).min(initial=math.inf) < 0.0:
         raise InputError("the flight starts beyond its end")
-    flight = _Flight(dynamics, start, values, duration, end)
+    flight = _Flight(dynamics, start, schedule, duration, end)
     provenance: dict[str, Any] = {"method": method, "tolerance": tolerance}
     if method in ("dop853", "cvodes"):
         march = _adaptive if method == "dop853" else _stiff
@@ -178,7 +198,7 @@ def fly(
             provenance |= {name: 16.0 / 15.0 * value for name, value in finer.items()}
     else:
         raise InputError(f"method is {method!r}, must be 'rk4', 'cvodes' or 'dop853'")
-    return record(dynamics, time, states, values, provenance)
+    return record(dynamics, time, states, schedule.at(time), provenance)
 
 
 def suggest_step(dynamics: Dynamics, state: Array, parameters: Array, duration: float) -> tuple[float, int]:
@@ -201,10 +221,15 @@ def suggest_method(every: int) -> Method:
 
 
 def record(dynamics: Dynamics, time: Array, states: Array, parameters: Array, provenance: dict[str, Any]) -> Trajectory:
-    """The trajectory of states (n, nx), with loads evaluated and range checked."""
-    outputs = dynamics.loads(states.T, np.tile(parameters[:, None], (1, len(time))), time[None, :])
+    """The trajectory of states (n, nx), with loads evaluated and range checked.
+
+    Parameters are those of all instants (n_parameters,), or of each (n_parameters, n).
+    """
+    if parameters.ndim == 1:
+        parameters = np.tile(parameters[:, None], (1, len(time)))
+    outputs = dynamics.loads(states.T, parameters, time[None, :])
     force, moment, density, sound, wind = (np.array(output).T for output in outputs)
-    x, y, z = np.array(dynamics.mass_properties(parameters, time[0])[1]).ravel().tolist()
+    x, y, z = np.array(dynamics.mass_properties(parameters[:, 0], time[0])[1]).ravel().tolist()
     quaternion = states[:, QUATERNION] / np.linalg.norm(states[:, QUATERNION], axis=1, keepdims=True)
     trajectory = Trajectory(
         time=time,
@@ -249,17 +274,19 @@ class _Flight(NamedTuple):
 
     dynamics: Dynamics
     start: Array
-    parameters: Array
+    schedule: Schedule
     duration: float
     end: End
 
 
 def _fixed_step(flight: _Flight, step: float, every: int) -> tuple[Array, Array]:
-    dynamics, start, parameters, duration, end = flight
+    dynamics, start, schedule, duration, end = flight
     room = math.ceil(duration / step * (1.0 + 1e-12)) // every + 3
     times, states = np.empty(room), np.empty((room, start.size))
     rate, monitor = dynamics.rate_kernel.code, dynamics.monitor_kernel.code
-    kept, outcome = runge_kutta(rate, monitor, start, parameters, duration, step, every, end.rows, times, states)
+    kept, outcome = runge_kutta(
+        rate, monitor, start, schedule.at(0.0)[:, 0], schedule.drive, duration, step, every, end.rows, times, states
+    )
     if outcome == NOT_FINITE:
         raise DivergenceError(f"flight is not finite after t = {times[kept - 1]:.6g} s: try a step below {step:.3g} s")
     return times[:kept].copy(), states[:kept].copy()
@@ -267,14 +294,28 @@ def _fixed_step(flight: _Flight, step: float, every: int) -> tuple[Array, Array]
 
 def _adaptive(flight: _Flight, spacing: float, tolerance: float) -> tuple[Array, Array]:
     """Instants `spacing` [s] apart, and where the flight ends."""
-    dynamics, start, parameters, duration, end = flight
+    dynamics, start, schedule, duration, end = flight
     instants = np.append(np.arange(0.0, duration * (1.0 - 1e-12), spacing), duration)
     times, states = np.empty(instants.size + 1), np.empty((instants.size + 1, start.size))
     absolute = 0.01 * tolerance * np.maximum(np.abs(start), 1.0)
     rate, monitor = dynamics.rate_kernel.code, dynamics.monitor_kernel.code
     limits = (tolerance, absolute)
+    # what depends on time or place may be short: a step from one instant to the next at most
+    largest = spacing if dynamics.time_dependent or dynamics.wind is not None else math.inf
     kept, outcome, _ = adaptive(
-        rate, monitor, start, parameters, instants, limits, end.rows, dop853(), _MAX_ADAPTIVE_STEPS, times, states
+        rate,
+        monitor,
+        start,
+        schedule.at(0.0)[:, 0],
+        schedule.drive,
+        instants,
+        limits,
+        largest,
+        end.rows,
+        dop853(),
+        _MAX_ADAPTIVE_STEPS,
+        times,
+        states,
     )
     if outcome in (NOT_FINITE, TOO_MANY_STEPS):
         why = "it takes too many steps" if outcome == TOO_MANY_STEPS else "it is not finite, or its steps vanish"
@@ -284,7 +325,10 @@ def _adaptive(flight: _Flight, spacing: float, tolerance: float) -> tuple[Array,
 
 def _stiff(flight: _Flight, spacing: float, tolerance: float) -> tuple[Array, Array]:
     """Instants evenly spaced over the duration, at most `spacing` [s] apart; the last step is cut to meet the end."""
-    dynamics, start, parameters, duration, end = flight
+    dynamics, start, schedule, duration, end = flight
+    if schedule.signals:
+        raise InputError(f"CVODES does not take signals ({', '.join(schedule.signals)}); 'rk4' and 'dop853' do")
+    parameters = schedule.at(0.0)[:, 0]
     number = math.ceil(duration / spacing * (1.0 - 1e-12))
     even = duration / number
     time = np.append(even * np.arange(number), duration)
@@ -314,11 +358,13 @@ def _last_step(flight: _Flight, one: Any, state: Array, step: float) -> tuple[fl
     """Length [s] of the step that meets the end, and the state there, shape (1, nx)."""
     from scipy.optimize import brentq
 
+    parameters = flight.schedule.at(0.0)[:, 0]
+
     def after(length: float) -> Array:
-        return _marched(one, state, flight.parameters, length)
+        return _marched(one, state, parameters, length)
 
     def margin(length: float) -> float:
-        return float(flight.end.margins(flight.dynamics, after(length), flight.parameters).min())
+        return float(flight.end.margins(flight.dynamics, after(length), parameters).min())
 
     if margin(step) >= 0.0:  # it ends there, to round-off
         return step, after(step)
