@@ -6,7 +6,6 @@ from indicial.flightsim.aerodynamics import (
     Aerodynamics,
     DerivativeAerodynamics,
     FlowState,
-    StateSpaceAerodynamics,
     SymmetricMissile,
     Validity,
 )
@@ -30,6 +29,7 @@ from indicial.flightsim.initial import InitialState
 from indicial.flightsim.modes import LinearModel, Mode, Modes, linearise, missile_modes
 from indicial.flightsim.signals import Signal
 from indicial.flightsim.simulate import End, fly, simulate
+from indicial.flightsim.state_space import ScheduledStateSpaceAerodynamics, StateSpaceAerodynamics
 from indicial.flightsim.trajectory import Trajectory
 from indicial.flightsim.turbulence import DrydenTurbulence
 from indicial.flightsim.vehicle import Vehicle, axisymmetric_inertia, basic_finner_range_model
@@ -71,6 +71,7 @@ __all__ = [
     "Mode",
     "Modes",
     "Motor",
+    "ScheduledStateSpaceAerodynamics",
     "Signal",
     "StandardAtmosphere",
     "StateSpaceAerodynamics",

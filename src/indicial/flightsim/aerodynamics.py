@@ -1,4 +1,4 @@
-r"""Aerodynamic loads as casadi expressions: derivatives, and state-space models in reduced time.
+r"""Aerodynamic loads as casadi expressions: the protocol, and loads from derivatives (`state_space`: with memory).
 
 Incidence here is sine-like: the transverse components of the unit vector along the velocity of the moment
 reference point, ``e = V_b/|V_b|``, so ``e_z = w/V`` and ``e_y = v/V`` (equal to alpha and beta to first order).
@@ -20,18 +20,14 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple, Protocol
 
 import casadi as ca
-import numpy as np
 
-from indicial.conventions import Array, ReferenceQuantities, transfer_longitudinal
+from indicial.conventions import ReferenceQuantities, transfer_longitudinal
 from indicial.derivatives import DerivativeTable
 from indicial.errors import InputError
 from indicial.flightsim.expressions import free_symbols
-
-if TYPE_CHECKING:
-    from control import StateSpace
 
 LagAxes = Literal["non_rolling", "body"]
 
@@ -340,127 +336,3 @@ class DerivativeAerodynamics(SymmetricMissile):
         """The derivatives in one line."""
         values = ", ".join(f"{name} {getattr(self, name)!s:.8}" for name in DERIVATIVES)
         return f"derivative model: {values}"
-
-
-@dataclass(frozen=True, kw_only=True)
-class StateSpaceAerodynamics(SymmetricMissile):
-    r"""Loads of a missile of fourfold symmetry from a state-space model in reduced time ``s = 2Vt/c``.
-
-    In each plane ``dx/ds = A x + B (e, q c/2V)``, ``(CN, Cm) = C x + D (e, q c/2V)``, advanced with ``ds = (2V/c) dt``,
-    V varying: ``dx/dt = (2V/c)(A x + B_1 e) + B_2 q``.
-
-    Parameters
-    ----------
-    system : control.StateSpace
-        Inputs alpha and ``q c/2V``, outputs CN and Cm, increments about zero incidence, time in s; taken by
-        name if the system's signals are named ``alpha``, ``q``, ``CN`` and ``Cm`` (further outputs are left alone),
-        in this order if not named.
-
-    Raises
-    ------
-    InputError
-        If the system is not of that form, not in continuous time, or not stable.
-    """
-
-    system: StateSpace
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.reference.rate_normalisation != "c/2V":
-            raise InputError(
-                "a state-space model's rate input is q c/2V: its reference must say rate_normalisation c/2V"
-            )
-        system = self.system
-        if system.ninputs != 2 or system.noutputs < 2:
-            raise InputError(
-                f"a state-space model needs inputs (alpha, q c/2V) and outputs (CN, Cm), "
-                f"this one has {system.ninputs} and {system.noutputs}"
-            )
-        _order(system.input_labels, ("alpha", "q"))
-        _order(system.output_labels, ("CN", "Cm"))
-        if system.dt:
-            raise InputError(f"a state-space model must be in continuous reduced time, this one has dt = {system.dt}")
-        if system.nstates and np.max(np.linalg.eigvals(system.A).real) >= 0.0:
-            raise InputError("a state-space model must be stable, this one has a pole with real part >= 0")
-
-    @property
-    def lag_names(self) -> tuple[str, ...]:
-        """``lag_pitch_0, ..., lag_yaw_0, ...``."""
-        return tuple(f"lag_{plane}_{i}" for plane in ("pitch", "yaw") for i in range(self.system.nstates))
-
-    @property
-    def matrices(self) -> tuple[Array, Array, Array, Array]:
-        """A, B, C, D with inputs (alpha, q c/2V) and outputs (CN, Cm)."""
-        columns = _order(self.system.input_labels, ("alpha", "q"))
-        rows = _order(self.system.output_labels, ("CN", "Cm"))
-        a, b, c, d = (np.asarray(m, dtype=float) for m in (self.system.A, self.system.B, self.system.C, self.system.D))
-        return a, b[:, columns], c[rows], d[np.ix_(rows, columns)]
-
-    def quasi_steady(self) -> DerivativeAerodynamics:
-        r"""The derivatives that the model has at k = 0: ``H_a(0)``, ``H_q(0)`` and ``H_a'(0)``.
-
-        With ``H(s) = D + C (sI - A)^-1 B``: ``H(0) = D - C A^-1 B`` and ``H'(0) = -C A^-2 B``.
-        """
-        a, b, c, d = self.matrices
-        settled = np.linalg.solve(a, b)
-        steady = d - c @ settled
-        slope = -c @ np.linalg.solve(a, settled)
-        return DerivativeAerodynamics(
-            reference=self.reference,
-            CA_0=self.CA_0,
-            Cl_p=self.Cl_p,
-            Cl_0=self.Cl_0,
-            lag_axes=self.lag_axes,
-            validity=self.validity,
-            CN_alpha=float(steady[0, 0]),
-            Cm_alpha=float(steady[1, 0]),
-            CN_q=float(steady[0, 1]),
-            Cm_q=float(steady[1, 1]),
-            CN_alphadot=float(slope[0, 0]),
-            Cm_alphadot=float(slope[1, 0]),
-        )
-
-    def plane(self, flow: FlowState, incidence: Any, rate: Any, turning: Any, lag: Any) -> tuple[Any, Any]:
-        """Normal force [N] and moment [N m] of one plane."""
-        del turning
-        _, _, c, d = self.matrices
-        static = 0.5 * flow.density * flow.speed**2 * self.reference.area
-        damping = flow.density * self.rate_scale * flow.speed
-        load = static * (_times(c, lag) + d[:, 0] * incidence) + damping * d[:, 1] * rate
-        return load[0], self.reference.length * load[1]
-
-    def lag_rate(self, flow: FlowState, lag: Any) -> Any:
-        """``(2V/c)(A x + B_1 e) + B_2 q`` of both planes, turned with the roll if they do not roll [1/s]."""
-        half = self.system.nstates
-        pitch, yaw = lag[:half], lag[half:]
-        pitch_rate = self._plane_lag_rate(flow, flow.incidence[1], flow.rate[1], pitch)
-        yaw_rate = self._plane_lag_rate(flow, flow.incidence[0], -flow.rate[2], yaw)
-        if self.lag_axes == "body":
-            return ca.vertcat(pitch_rate, yaw_rate)
-        spin = flow.rate[0]
-        return ca.vertcat(pitch_rate - spin * yaw, yaw_rate + spin * pitch)
-
-    def _plane_lag_rate(self, flow: FlowState, incidence: Any, rate: Any, lag: Any) -> Any:
-        a, b, _, _ = self.matrices
-        return 2.0 * flow.speed / self.reference.length * (_times(a, lag) + b[:, 0] * incidence) + b[:, 1] * rate
-
-    def summary(self) -> str:
-        """Order and slowest pole in one line."""
-        if not self.system.nstates:
-            return "state-space model of order 0"
-        slowest = np.max(np.linalg.eigvals(self.system.A).real)
-        return f"state-space model of order {self.system.nstates} in each plane, slowest pole {slowest:.4g} per unit s"
-
-
-def _times(matrix: Array, vector: Any) -> Any:
-    """``matrix @ vector`` with the zeros of the matrix left out of the expression."""
-    return ca.mtimes(ca.sparsify(ca.DM(matrix)), vector)
-
-
-def _order(labels: list[str], wanted: tuple[str, ...]) -> list[int]:
-    """Where the wanted signals stand: by name if the system names them, in order if it has default names."""
-    if all(name in labels for name in wanted):
-        return [labels.index(name) for name in wanted]
-    if len(labels) == len(wanted) and all("[" in label for label in labels):
-        return list(range(len(wanted)))
-    raise InputError(f"a state-space model's signals are named {labels}, must be {list(wanted)}")
