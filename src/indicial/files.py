@@ -1,4 +1,4 @@
-"""Writing files so that nothing is ever half written."""
+"""Writing files so that nothing is ever half written, and states so that a killed run goes on where it was."""
 
 from __future__ import annotations
 
@@ -6,12 +6,17 @@ import hashlib
 import json
 import os
 import tempfile
+import time
+import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from indicial.errors import InputError
 
@@ -138,3 +143,48 @@ def _umask() -> int:
     mask = os.umask(0)
     os.umask(mask)
     return mask
+
+
+class Checkpoint:
+    """Named arrays in one file that belongs to one computation.
+
+    Parameters
+    ----------
+    path : Path
+        The file; need not exist.
+    key : str
+        What the state belongs to. A file with another key is not read.
+    interval : float
+        Least time between two saves [s], so that saving never rules the run.
+    """
+
+    def __init__(self, path: Path, key: str, interval: float = 20.0) -> None:
+        self.path = path
+        self._key = key
+        self._interval = interval
+        self._saved = time.monotonic()
+
+    def load(self) -> dict[str, NDArray[Any]] | None:
+        """The arrays of the last save, or None."""
+        try:
+            with np.load(self.path, allow_pickle=False) as stored:
+                if str(stored["key"]) != self._key:
+                    return None
+                return {name: stored[name] for name in stored.files if name != "key"}
+        except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):
+            return None
+
+    def save(self, **arrays: NDArray[Any]) -> None:
+        """Save now."""
+        with atomic_path(self.path) as temporary, open(temporary, "wb") as file:
+            np.savez(file, allow_pickle=False, key=np.array(self._key), **arrays)
+        self._saved = time.monotonic()
+
+    def save_if_due(self, **arrays: NDArray[Any]) -> None:
+        """Save if the interval has passed."""
+        if time.monotonic() - self._saved >= self._interval:
+            self.save(**arrays)
+
+    def remove(self) -> None:
+        """Delete the file: the computation is complete."""
+        self.path.unlink(missing_ok=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
@@ -78,6 +79,50 @@ class PeriodicSolver(Protocol):
 
         There is no start: the history's `before` are its loads at t = 0.
         """
+        ...
+
+
+class SteppedFlow(Protocol):
+    """A flow that goes on step by step, under a motion that is not known beforehand.
+
+    Loads are (CA, CY, CN, Cl, Cm, Cn) by the dynamic pressure of the condition it was started with, shape (6,).
+    """
+
+    def loads(self) -> Array:
+        """Of the accepted state."""
+        ...
+
+    def try_step(self, dt: float, velocity: Array, rate: Array) -> Array:
+        """Loads a step [s] after the accepted state, under a motion (body axes, m/s and rad/s) reached by then.
+
+        May be tried again with another motion; takes effect with `accept`.
+        """
+        ...
+
+    def accept(self) -> None:
+        """Take the step tried last."""
+        ...
+
+    def arrays(self) -> dict[str, Array]:
+        """What `restore` needs to go on from the accepted state."""
+        ...
+
+    def restore(self, arrays: Mapping[str, Array]) -> None:
+        """Go on from stored `arrays`."""
+        ...
+
+
+@runtime_checkable
+class SteppingSolver(Protocol):
+    """A solver in the loop of a flight: its own loads make the motion that it follows."""
+
+    @property
+    def reference(self) -> ReferenceQuantities:
+        """What the loads are made dimensionless with."""
+        ...
+
+    def stepping(self, condition: FlightCondition, velocity: Array, rate: Array) -> SteppedFlow:
+        """The flow at rest in a motion of the moment reference point, body axes [m/s], [rad/s]."""
         ...
 
 

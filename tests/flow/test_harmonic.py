@@ -11,11 +11,11 @@ from indicial.cfd import FiniteVolumeSolver, FlowSettings
 from indicial.cfd.flow import STILL_AIR, Grid, Jacobian, MeshMotion, Residual
 from indicial.cfd.flow.gas import conservative_jacobian
 from indicial.cfd.march import Pattern, PeriodicState, converge_periodic
-from indicial.cfd.march.checkpoint import Checkpoint
 from indicial.cfd.march.time_spectral import PeriodicResidual, resample, spectral_derivative
 from indicial.cfd.mesh import box_mesh, plate_mesh
 from indicial.conventions import ReferenceQuantities
 from indicial.errors import DivergenceError, InputError
+from indicial.files import Checkpoint
 from indicial.motion import AlphaStep, FlightCondition, PitchOscillation, Rates, SteadyMotion
 from indicial.solver import PeriodicSolver, instants
 
@@ -284,7 +284,7 @@ def test_a_killed_solver_resumes_its_periodic_flow_from_its_folder(
 ) -> None:
     """A save is due at every look at the clock, as if each Newton step took a minute."""
     clock = iter(range(0, 10**6, 60))
-    monkeypatch.setattr("indicial.cfd.march.checkpoint.time", SimpleNamespace(monotonic=lambda: next(clock)))
+    monkeypatch.setattr("indicial.files.time", SimpleNamespace(monotonic=lambda: next(clock)))
     motion = pitching(np.radians(1.0))
     whole = plate(8).periodic(CONDITION, motion, motion.period)
 

@@ -36,6 +36,25 @@ def alpha_step(solver: FiniteVolumeSolver) -> History:
     return solver.unsteady(CONDITION, AlphaStep(CONDITION, 0.01), TIMES)
 
 
+def test_steps_taken_one_by_one_are_those_of_a_march() -> None:
+    """Each tried twice, first with another motion: what is accepted is the march's, and a restored flow goes on."""
+    solver, motion = plate(), AlphaStep(CONDITION, 0.01)
+    whole = alpha_step(solver)
+    flow = solver.stepping(CONDITION, motion.velocity_before, motion.rate_before)
+    assert flow.loads() == pytest.approx(whole.before, abs=1e-12)
+    for n in range(1, 9):
+        dt = float(TIMES[n] - TIMES[n - 1])
+        flow.try_step(dt, 1.001 * motion.velocity(TIMES[n]), motion.rate(TIMES[n]))
+        loads = flow.try_step(dt, motion.velocity(TIMES[n]), motion.rate(TIMES[n]))
+        assert loads == pytest.approx(whole.coefficients[n], abs=1e-9)
+        flow.accept()
+        if n == 5:
+            kept = flow.arrays()
+            flow = solver.stepping(CONDITION, motion.velocity_before, motion.rate_before)
+            flow.restore(kept)
+            assert flow.loads() == pytest.approx(whole.coefficients[n], abs=1e-9)
+
+
 class KilledError(Exception):
     pass
 
@@ -43,7 +62,7 @@ class KilledError(Exception):
 def test_a_killed_march_resumes_and_gives_the_same_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A save is due at every look at the clock, as if each step took a minute."""
     clock = iter(range(0, 10**6, 60))
-    monkeypatch.setattr("indicial.cfd.march.checkpoint.time", SimpleNamespace(monotonic=lambda: next(clock)))
+    monkeypatch.setattr("indicial.files.time", SimpleNamespace(monotonic=lambda: next(clock)))
     whole = alpha_step(plate())
     plate(tmp_path).start_from(CONDITION)
 

@@ -29,6 +29,7 @@ from indicial.cfd.march.unsteady import march
 from indicial.cfd.memory import operator_bytes, require, steady_bytes
 from indicial.cfd.mesh import Mesh
 from indicial.cfd.operator import ANTISYMMETRIC, KRYLOV_VECTORS, SYMMETRIC, FlowOperator
+from indicial.cfd.stepped import SteppedFiniteVolumes
 from indicial.conventions import Array, ReferenceQuantities, mesh_from_body
 from indicial.errors import DivergenceError, InputError
 from indicial.frequency import INPUTS, FrequencyResponse, reduced_frequencies
@@ -189,6 +190,41 @@ class FiniteVolumeSolver:
             "worst_step_residual": result.worst_residual,
         }
         return self._history(t, loads, initial, condition, motion, spent)
+
+    def stepping(self, condition: FlightCondition, velocity: Array, rate: Array) -> SteppedFiniteVolumes:
+        """The flow at rest in a motion, to go on step by step under one that its own loads make.
+
+        Parameters
+        ----------
+        condition : FlightCondition
+            The air, and whose dynamic pressure the loads are made dimensionless with.
+        velocity, rate : ndarray
+            Of the moment reference point, body axes [m/s], [rad/s], shape (3,).
+
+        Raises
+        ------
+        InputError
+            If the motion crosses the mesh's symmetry plane.
+        DivergenceError
+            If the steady state does not converge.
+        """
+        start = self._state(condition, velocity, rate)
+
+        def motion_of(velocity: Array, rate: Array) -> MeshMotion:
+            motion = self._mesh_motion(condition, velocity, rate)
+            check_symmetry(self.grid, motion)
+            return motion
+
+        return SteppedFiniteVolumes(
+            self._residual,
+            self._pattern,
+            start.q,
+            motion_of,
+            lambda: self._coefficients(*self._residual.forces(AMBIENT_PRESSURE), condition),
+            condition.speed_of_sound / self._reference.length,
+            (velocity, rate),
+            self.settings.unsteady_tolerance,
+        )
 
     def periodic(self, condition: FlightCondition, motion: Motion, period: float, harmonics: int = 1) -> History:
         """Loads at 2h + 1 instants of one period [s] of the flow under a periodic motion, truncated after h harmonics.

@@ -9,13 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from indicial.cfd.flow.residual import MeshMotion
-from indicial.cfd.march.checkpoint import Checkpoint
 from indicial.cfd.march.convergence import ConvergenceHistory
 from indicial.cfd.march.steady import SteadyState
 from indicial.cfd.mesh import Mesh
 from indicial.conventions import Array, ReferenceQuantities
 from indicial.errors import DivergenceError
-from indicial.files import sources_digest
+from indicial.files import Checkpoint, sources_digest
 from indicial.motion import FlightCondition
 
 _NEAR = 0.1

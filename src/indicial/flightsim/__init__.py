@@ -25,6 +25,7 @@ from indicial.flightsim.earth import WGS84, Earth, FlatEarth
 from indicial.flightsim.epicycle import Arm, EpicyclicFit, fit_epicycle, fit_trajectory
 from indicial.flightsim.expressions import ALPHA, ALTITUDE, BETA, MACH, TIME, TOTAL_ANGLE, table
 from indicial.flightsim.forces import Force, FunctionForce, Motor
+from indicial.flightsim.in_flow import LoadFunction, fly_in_flow
 from indicial.flightsim.initial import InitialState
 from indicial.flightsim.modes import LinearModel, Mode, Modes, linearise, missile_modes
 from indicial.flightsim.signals import Signal
@@ -68,6 +69,7 @@ __all__ = [
     "FunctionForce",
     "InitialState",
     "LinearModel",
+    "LoadFunction",
     "Mode",
     "Modes",
     "Motor",
@@ -94,6 +96,7 @@ __all__ = [
     "fit_epicycle",
     "fit_trajectory",
     "fly",
+    "fly_in_flow",
     "holding_roll",
     "linearise",
     "missile_modes",

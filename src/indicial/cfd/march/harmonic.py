@@ -15,7 +15,6 @@ import numpy as np
 
 from indicial.cfd.flow.gas import RHO, P
 from indicial.cfd.flow.residual import MeshMotion, Residual
-from indicial.cfd.march.checkpoint import Checkpoint
 from indicial.cfd.march.continuation import Standing, continuation
 from indicial.cfd.march.convergence import ConvergenceHistory, Recorder
 from indicial.cfd.march.ilu import Pattern
@@ -23,6 +22,7 @@ from indicial.cfd.march.steady import Progress, limited_update, residual_scale
 from indicial.cfd.march.time_spectral import PeriodicJacobian, PeriodicResidual, resample
 from indicial.conventions import Array
 from indicial.errors import DivergenceError, InputError
+from indicial.files import Checkpoint
 
 _NEAR = 1e-2
 """Residual of a start from which the second-order scheme is taken at once."""
