@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import hashlib
+import io
 import json
 import os
 import tempfile
@@ -45,6 +47,42 @@ def write_text(path: str | Path, text: str) -> None:
     """Write `text` to `path` in one step."""
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def write_csv(path: str | Path, header: Mapping[str, Any], columns: Mapping[str, NDArray[np.float64]]) -> None:
+    """Write a CSV file in one step: header in ``# key: value`` lines, a line of names, every digit of numbers kept."""
+    out = io.StringIO()
+    for key, value in header.items():
+        out.write(f"# {key}: {value}\n")
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(map(repr, row) for row in np.stack(list(columns.values()), axis=1).tolist())
+    write_text(path, out.getvalue())
+
+
+def read_csv(path: str | Path) -> tuple[dict[str, str], dict[str, NDArray[np.float64]]]:
+    """Header and columns of a file of `write_csv`.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, has no rows, or holds something that is not a number.
+    """
+    try:
+        lines = Path(path).read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not a readable CSV file ({error})") from error
+    header = dict(line[2:].split(": ", 1) for line in lines if line.startswith("# ") and ": " in line)
+    rows = list(csv.reader(line for line in lines if line.strip() and not line.startswith("#")))
+    if len(rows) < 2:
+        raise InputError(f"{path}: has no rows under its line of names")
+    values = np.empty((len(rows) - 1, len(rows[0])))
+    for i, row in enumerate(rows[1:]):
+        try:
+            values[i] = [float(one) for one in row]
+        except ValueError as error:
+            raise InputError(f"{path}: row {i + 1} does not hold {len(rows[0])} numbers ({error})") from error
+    return header, dict(zip(rows[0], values.T, strict=True))
 
 
 def parse_json(path: str | Path) -> Any:

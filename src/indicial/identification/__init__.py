@@ -6,12 +6,15 @@ from indicial.identification.linear_theory import LinearTheory, linear_theory
 from indicial.identification.measurement import Precision, RangeRecord, measure
 from indicial.identification.output_error import estimate, identify, reduce_linearly, start_values
 from indicial.identification.output_model import FREE_FLIGHT, OutputModel, build_output_model, substeps_needed
+from indicial.identification.record import CHANNEL_UNITS, FlightRecord
 from indicial.identification.result import IdentificationResult
 
 __all__ = [
+    "CHANNEL_UNITS",
     "FREE_FLIGHT",
     "Accuracy",
     "Estimate",
+    "FlightRecord",
     "IdentificationResult",
     "LinearTheory",
     "OutputModel",

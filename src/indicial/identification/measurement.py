@@ -7,7 +7,6 @@ how the missile's axis (and a marked fin) stood at the instant of the spark.
 from __future__ import annotations
 
 import csv
-import io
 import json
 import math
 from collections.abc import Mapping
@@ -20,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from indicial.conventions import Array
 from indicial.errors import InputError
-from indicial.files import read_netcdf, write_netcdf, write_text
+from indicial.files import read_netcdf, write_csv, write_netcdf
 from indicial.flightsim import Trajectory
 
 if TYPE_CHECKING:
@@ -169,15 +168,8 @@ class RangeRecord:
 
     def to_csv(self, path: str | Path) -> None:
         """Write a CSV file: header in `#` lines, units in column names, every digit kept."""
-        out = io.StringIO()
-        for key, value in self._header().items():
-            out.write(f"# {key}: {value}\n")
-        writer = csv.writer(out, lineterminator="\n")
-        names = ("time", *self.channels)
-        writer.writerow(f"{name}_{_UNITS[name]}" for name in names)
-        rows = np.stack([getattr(self, name) for name in names], axis=1)
-        writer.writerows([repr(value) for value in row] for row in rows.tolist())
-        write_text(path, out.getvalue())
+        columns = {f"{name}_{_UNITS[name]}": getattr(self, name) for name in ("time", *self.channels)}
+        write_csv(path, self._header(), columns)
 
     @classmethod
     def from_csv(cls, path: str | Path, precision: Precision | None = None) -> Self:
