@@ -28,11 +28,11 @@ def flight() -> Trajectory:
     return simulate(FINNER, first_order_lag(0.3), START, 0.02, step=1e-5)
 
 
-@pytest.mark.parametrize("suffix", ["nc", "csv"])
+@pytest.mark.parametrize("suffix", ["nc", "csv", "parquet"])
 def test_a_file_brings_every_digit_back(flight: Trajectory, tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"flight.{suffix}"
-    getattr(flight, {"nc": "to_netcdf", "csv": "to_csv"}[suffix])(path)
-    back = getattr(Trajectory, {"nc": "from_netcdf", "csv": "from_csv"}[suffix])(path)
+    flight.save(path)
+    back = Trajectory.load(path)
     for item in fields(Trajectory):
         one, other = getattr(flight, item.name), getattr(back, item.name)
         assert np.array_equal(one, other) if isinstance(one, np.ndarray) else one == other
@@ -42,17 +42,25 @@ def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "other.csv"
     path.write_text("# format: something\ntime\n0\n")
     with pytest.raises(InputError, match="trajectory"):
-        Trajectory.from_csv(path)
+        Trajectory.load(path)
     with pytest.raises(InputError, match="no such"):
-        Trajectory.from_netcdf(tmp_path / "missing.nc")
+        Trajectory.load(tmp_path / "missing.nc")
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    parquet.write_table(pyarrow.table({"time_s": [0.0]}), tmp_path / "other.parquet")
+    for name in ("other", "missing"):
+        with pytest.raises(InputError, match=f"{name}.parquet"):
+            Trajectory.load(tmp_path / f"{name}.parquet")
+    with pytest.raises(InputError, match="ends in"):
+        Trajectory.load(tmp_path / "flight.txt")
 
 
 def test_a_file_that_lacks_a_column_is_refused(flight: Trajectory, tmp_path: Path) -> None:
     path = tmp_path / "flight.csv"
-    flight.to_csv(path)
+    flight.save(path)
     path.write_text(path.read_text().replace("q_rad_s", "q_deg_s"))
     with pytest.raises(InputError, match="q_rad_s"):
-        Trajectory.from_csv(path)
+        Trajectory.load(path)
 
 
 def test_interpolation_is_of_fourth_order_between_instants() -> None:

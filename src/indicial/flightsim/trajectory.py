@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import json
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,34 +10,14 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from indicial.conventions import COEFFICIENTS, Array, ReferenceQuantities, flow_angles
+from indicial.conventions import Array, ReferenceQuantities, flow_angles
 from indicial.errors import InputError
-from indicial.files import check_format, read_netcdf, write_netcdf, write_text
 from indicial.flightsim.attitude import euler_angles, matrix_from_quaternion
+from indicial.flightsim.trajectory_files import COLUMNS, dataset, load, save
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
-
-SCHEMA_VERSION = 2
-FORMAT = "indicial trajectory"
-
-_COLUMNS = {
-    "position": ("x_m", "y_m", "z_m"),
-    "velocity": ("u_m_s", "v_m_s", "w_m_s"),
-    "quaternion": ("q0", "q1", "q2", "q3"),
-    "rate": ("p_rad_s", "q_rad_s", "r_rad_s"),
-    "force": ("force_x_n", "force_y_n", "force_z_n"),
-    "moment": ("moment_x_n_m", "moment_y_n_m", "moment_z_n_m"),
-    "wind": ("wind_u_m_s", "wind_v_m_s", "wind_w_m_s"),
-}
-_UNITS = {"position": "m", "velocity": "m/s", "quaternion": "1", "rate": "rad/s"} | {
-    "force": "N",
-    "moment": "N m",
-    "wind": "m/s",
-}
-_AXES = {"position": "earth", "quaternion": "body to earth"}
-_ANGLES_DEG = {"alpha_deg": "alpha", "beta_deg": "beta", "total_angle_deg": "total_angle"}
 
 
 @dataclass(frozen=True)
@@ -96,7 +73,7 @@ class Trajectory:
         if np.size(self.wind) == 0:
             object.__setattr__(self, "wind", np.zeros((n, 3)))
         shapes = {"time": (n,), "density": (n,), "speed_of_sound": (n,), "lag": (n, len(self.lag_names))}
-        shapes |= {name: (n, len(columns)) for name, columns in _COLUMNS.items()}
+        shapes |= {name: (n, len(columns)) for name, columns in COLUMNS.items()}
         for name, shape in shapes.items():
             values = np.asarray(getattr(self, name), dtype=float)
             if values.shape != shape or not np.all(np.isfinite(values)):
@@ -194,7 +171,7 @@ class Trajectory:
         t = np.atleast_1d(np.asarray(times, dtype=float))
         if t.size == 0 or np.min(t) < self.time[0] or np.max(t) > self.time[-1]:
             raise InputError(f"times must be within {self.time[0]:g} to {self.time[-1]:g} s of the trajectory")
-        names = (*_COLUMNS, "density", "speed_of_sound", "lag")
+        names = (*COLUMNS, "density", "speed_of_sound", "lag")
         values: dict[str, Any] = {name: CubicSpline(self.time, getattr(self, name))(t) for name in names}
         values["quaternion"] /= np.linalg.norm(values["quaternion"], axis=1, keepdims=True)
         nearest = np.clip(np.searchsorted(self.time, t), 0, len(self) - 1)
@@ -232,116 +209,28 @@ class Trajectory:
 
     def to_dataset(self) -> xarray.Dataset:
         """The trajectory as an `xarray.Dataset` with units."""
-        import xarray as xr
+        return dataset(self)
 
-        data: dict[str, Any] = {}
-        for name in _COLUMNS:
-            second = "component" if name == "quaternion" else "axis"
-            attrs = {"units": _UNITS[name], "axes": _AXES.get(name, "body")}
-            data[name] = (("time", second), getattr(self, name), attrs)
-        data["lag"] = (("time", "lag_state"), self.lag, {"units": "1"})
-        data["density"] = ("time", self.density, {"units": "kg/m^3"})
-        data["speed_of_sound"] = ("time", self.speed_of_sound, {"units": "m/s"})
-        data["mach"] = ("time", self.mach, {"units": "1"})
-        for name in ("alpha", "beta", "total_angle"):
-            data[name] = ("time", getattr(self, name), {"units": "rad"})
-        data["coefficients"] = (
-            ("time", "coefficient"),
-            self.coefficients,
-            {"units": "1", "axes": "body", "moments": "about the centre of gravity"},
-        )
-        data["outside_range"] = ("time", self.outside_range.astype(np.int8), {"units": "1"})
-        coords: dict[str, Any] = {
-            "time": ("time", self.time, {"units": "s"}),
-            "axis": ["x", "y", "z"],
-            "component": ["q0", "q1", "q2", "q3"],
-            "coefficient": list(COEFFICIENTS),
-        }
-        return xr.Dataset(data, coords, self._header())
-
-    def to_netcdf(self, path: str | Path) -> None:
-        """Write a netCDF-4 file in one step."""
-        write_netcdf(path, self.to_dataset())
-
-    @classmethod
-    def from_netcdf(cls, path: str | Path) -> Self:
-        """Read a file of `to_netcdf`.
+    def save(self, path: str | Path) -> None:
+        """Write a file in one step: CSV, netCDF-4 or Parquet (needs pyarrow) by its suffix, every digit kept.
 
         Raises
         ------
         InputError
-            If the file is missing or not an indicial trajectory.
+            If the suffix is not .csv, .nc or .parquet, or pyarrow is missing.
         """
-        data = read_netcdf(path, FORMAT, SCHEMA_VERSION)
-        header = _checked_header(dict(data.attrs), path)
-        names = ("time", *_COLUMNS, "density", "speed_of_sound", "lag", "outside_range")
-        values: dict[str, Any] = {name: data[name].values for name in names}
-        return cls(**values, **header)
-
-    def to_csv(self, path: str | Path) -> None:
-        """Write a CSV file: header in `#` lines, units in column names, every digit kept.
-
-        Angles in degrees and the Mach number are written too, for the reader; `from_csv` does not need them.
-        """
-        out = io.StringIO()
-        for key, value in self._header().items():
-            out.write(f"# {key}: {value}\n")
-        columns = {"time_s": self.time}
-        for name, labels in _COLUMNS.items():
-            columns |= dict(zip(labels, getattr(self, name).T, strict=True))
-        columns |= {"density_kg_m3": self.density, "speed_of_sound_m_s": self.speed_of_sound}
-        columns |= dict(zip(self.lag_names, self.lag.T, strict=True))
-        columns |= {"mach": self.mach}
-        columns |= {label: np.degrees(getattr(self, name)) for label, name in _ANGLES_DEG.items()}
-        writer = csv.writer(out, lineterminator="\n")
-        writer.writerow([*columns, "outside_range"])
-        for row, outside in zip(np.column_stack(list(columns.values())).tolist(), self.outside_range, strict=True):
-            writer.writerow([*map(repr, row), int(outside)])
-        write_text(path, out.getvalue())
+        save(self, path)
 
     @classmethod
-    def from_csv(cls, path: str | Path) -> Self:
-        """Read a file of `to_csv`, columns by name.
+    def load(cls, path: str | Path) -> Self:
+        """Read a file of `save`.
 
         Raises
         ------
         InputError
             If the file is missing, not an indicial trajectory, or lacks a column.
         """
-        try:
-            lines = Path(path).read_text(encoding="utf-8").splitlines()
-        except OSError as error:
-            raise InputError(f"{path}: not a readable trajectory file ({error.strerror})") from error
-        attrs = dict(line[2:].split(": ", 1) for line in lines if line.startswith("# ") and ": " in line)
-        header = _checked_header(attrs, path)
-        rows = list(csv.reader(line for line in lines if not line.startswith("#")))
-        try:
-            table = np.array(rows[1:], dtype=float)
-            column = {name: table[:, i] for i, name in enumerate(rows[0])}
-            values: dict[str, Any] = {
-                name: np.stack([column[c] for c in labels], axis=1) for name, labels in _COLUMNS.items()
-            }
-            lag = np.reshape([column[c] for c in header["lag_names"]], (len(header["lag_names"]), len(table))).T
-            return cls(
-                time=column["time_s"],
-                **values,
-                density=column["density_kg_m3"],
-                speed_of_sound=column["speed_of_sound_m_s"],
-                lag=lag,
-                outside_range=column["outside_range"],
-                **header,
-            )
-        except (IndexError, KeyError, ValueError) as error:
-            raise InputError(f"{path}: not a complete trajectory ({error})") from error
-
-    def _header(self) -> dict[str, Any]:
-        return {
-            "format": FORMAT,
-            "schema_version": SCHEMA_VERSION,
-            "reference": json.dumps(self.reference.to_dict()),
-            "lag_names": json.dumps(list(self.lag_names)),
-            "provenance": json.dumps(self.provenance),
-        }
+        return cls(**load(path))
 
     def summary(self) -> str:
         """What was flown, how far, how fast, within the models' range or not."""
@@ -392,12 +281,3 @@ class Trajectory:
         axes[1, 1].set(xlabel="x [m]", ylabel="[m]")
         axes[1, 1].legend()
         return figure
-
-
-def _checked_header(attrs: dict[str, Any], path: str | Path) -> dict[str, Any]:
-    check_format(path, attrs, FORMAT, SCHEMA_VERSION)
-    return {
-        "reference": ReferenceQuantities.from_dict(json.loads(attrs["reference"])),
-        "lag_names": tuple(json.loads(attrs["lag_names"])),
-        "provenance": json.loads(attrs["provenance"]),
-    }

@@ -82,8 +82,8 @@ def fly_twice(context: Context) -> Outcome:
     for done, (name, model) in enumerate(models.items()):
         context.reporter.update(done / 3.0, f"flight with {name}")
         flights[name] = _fly(context, body, model)
-        flights[name].to_netcdf(context.folder.histories / f"flight_{name}.nc")
-        flights[name].to_csv(context.folder.histories / f"flight_{name}.csv")
+        flights[name].save(context.folder.histories / f"flight_{name}.nc")
+        flights[name].save(context.folder.histories / f"flight_{name}.csv")
         checks[name] = _damping(context, body, model)
     comparison = compare(flights["derivatives"], flights["rom"])
     results = {
@@ -100,7 +100,7 @@ def fly_twice(context: Context) -> Outcome:
 def load_flights(context: Context) -> dict[str, Trajectory]:
     """The flights that the stage kept."""
     context.folder.read("fly")
-    return {name: Trajectory.from_netcdf(context.folder.histories / f"flight_{name}.nc") for name in FLIGHTS}
+    return {name: Trajectory.load(context.folder.histories / f"flight_{name}.nc") for name in FLIGHTS}
 
 
 def atmosphere(context: Context) -> ConstantAtmosphere:

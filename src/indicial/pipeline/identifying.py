@@ -31,7 +31,7 @@ def identify_flight(context: Context) -> Outcome:
     context.reporter.update(0.2, "output error")
     free = (*FREE_FLIGHT, *(("Cl_p",) if rolls else ()))
     result = identify(record, vehicle(context), free=free, atmosphere=atmosphere(context))
-    result.fitted.to_netcdf(folder.histories / "identified_flight.nc")
+    result.fitted.save(folder.histories / "identified_flight.nc")
     table = result.table(context.case.flight_condition)
     write_text(folder.path / "identification.txt", result.summary() + "\n")
     results = {
