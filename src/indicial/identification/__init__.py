@@ -6,6 +6,7 @@ from indicial.identification.linear_theory import LinearTheory, linear_theory
 from indicial.identification.measurement import Precision, RangeRecord, measure
 from indicial.identification.output_error import estimate, identify, reduce_linearly, start_values
 from indicial.identification.output_model import FREE_FLIGHT, OutputModel, build_output_model, substeps_needed
+from indicial.identification.reading import read_flight_record
 from indicial.identification.record import CHANNEL_UNITS, FlightRecord
 from indicial.identification.result import IdentificationResult
 
@@ -26,6 +27,7 @@ __all__ = [
     "identify",
     "linear_theory",
     "measure",
+    "read_flight_record",
     "reduce_linearly",
     "start_values",
     "substeps_needed",

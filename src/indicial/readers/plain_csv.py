@@ -17,6 +17,13 @@ def recognises(path: Path) -> bool:
 
 def read(path: Path) -> tuple[Table, ...]:
     """The one table of a file; comments begin with #, and one of them may name the columns."""
+    names, rows = split_table(path)
+    columns, notes = numeric_rows(rows, names, path)
+    return (Table(path.name, columns, notes=notes),)
+
+
+def split_table(path: Path) -> tuple[list[str], list[list[str]]]:
+    """Names of the columns and fields of the rows, as text, decimal commas made points."""
     lines = [line for line in read_text(path).splitlines() if line.strip()]
     first = next((i for i, line in enumerate(lines) if _is_numeric(line)), None)
     if first is None or first == 0:
@@ -26,8 +33,7 @@ def read(path: Path) -> tuple[Table, ...]:
     rows = [_split(line, delimiter) for line in lines[first:] if not line.startswith("#")]
     if delimiter == ";":
         rows = [[one.replace(",", ".") for one in row] for row in rows]
-    columns, notes = numeric_rows(rows, names, path)
-    return (Table(path.name, columns, notes=notes),)
+    return names, rows
 
 
 def _is_numeric(line: str) -> bool:
