@@ -2,6 +2,7 @@
 
 from indicial.identification.accuracy import Accuracy, Whiteness
 from indicial.identification.estimate import Estimate
+from indicial.identification.instruments import Installation, Sensor, measure_flight
 from indicial.identification.linear_theory import LinearTheory, linear_theory
 from indicial.identification.measurement import Precision, RangeRecord, measure
 from indicial.identification.output_error import estimate, identify, reduce_linearly, start_values
@@ -17,16 +18,19 @@ __all__ = [
     "Estimate",
     "FlightRecord",
     "IdentificationResult",
+    "Installation",
     "LinearTheory",
     "OutputModel",
     "Precision",
     "RangeRecord",
+    "Sensor",
     "Whiteness",
     "build_output_model",
     "estimate",
     "identify",
     "linear_theory",
     "measure",
+    "measure_flight",
     "read_flight_record",
     "reduce_linearly",
     "start_values",
