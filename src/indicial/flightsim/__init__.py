@@ -28,10 +28,12 @@ from indicial.flightsim.forces import Force, FunctionForce, Motor
 from indicial.flightsim.in_flow import LoadFunction, fly_in_flow
 from indicial.flightsim.initial import InitialState
 from indicial.flightsim.modes import LinearModel, Mode, Modes, linearise, missile_modes
+from indicial.flightsim.outputs import OUTPUTS
 from indicial.flightsim.signals import Signal
 from indicial.flightsim.simulate import End, fly, simulate
 from indicial.flightsim.state_space import ScheduledStateSpaceAerodynamics, StateSpaceAerodynamics
 from indicial.flightsim.trajectory import Trajectory
+from indicial.flightsim.trim import Trim, Unknown, trim
 from indicial.flightsim.turbulence import DrydenTurbulence
 from indicial.flightsim.vehicle import Vehicle, axisymmetric_inertia, basic_finner_range_model
 from indicial.flightsim.wind import CosineGust, SteadyWind, Wind, WindProfile, Winds
@@ -42,6 +44,7 @@ __all__ = [
     "BETA",
     "DERIVATIVES",
     "MACH",
+    "OUTPUTS",
     "TIME",
     "TOTAL_ANGLE",
     "WGS84",
@@ -81,6 +84,8 @@ __all__ = [
     "SymmetricMissile",
     "Trajectory",
     "TrajectoryComparison",
+    "Trim",
+    "Unknown",
     "Validity",
     "Vehicle",
     "Wind",
@@ -102,4 +107,5 @@ __all__ = [
     "missile_modes",
     "simulate",
     "table",
+    "trim",
 ]

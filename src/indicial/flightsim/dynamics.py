@@ -290,7 +290,7 @@ def build_dynamics(
     position, velocity, quaternion, rate = state[POSITION], state[VELOCITY], state[QUATERNION], state[RATE]
     lag = state[len(RIGID_STATES) :]
 
-    rotation = _rotation(quaternion)
+    rotation = rotation_matrix(quaternion)
     altitude = earth.altitude(position)
     air = atmosphere.air(altitude)
     turning = ca.SX.sym("turning", 2)
@@ -431,7 +431,7 @@ def _solve_turning(turning: Any, flow: FlowState, velocity: Any, acceleration: A
     return ca.mtimes(ca.inv_minor(ca.densify(ca.DM.eye(2) - slope)), constant)
 
 
-def _rotation(quaternion: Any) -> Any:
+def rotation_matrix(quaternion: Any) -> Any:
     """Rotation matrix body -> earth of a quaternion of any norm."""
     w, x, y, z = ca.vertsplit(quaternion)
     scale = 2.0 / ca.sumsqr(quaternion)
