@@ -28,6 +28,7 @@ from indicial.flightsim.forces import Force, FunctionForce, Motor
 from indicial.flightsim.in_flow import LoadFunction, fly_in_flow
 from indicial.flightsim.initial import InitialState
 from indicial.flightsim.modes import LinearModel, Mode, Modes, linearise, missile_modes
+from indicial.flightsim.monte_carlo import Dispersion, MonteCarlo, monte_carlo
 from indicial.flightsim.outputs import OUTPUTS
 from indicial.flightsim.signals import Signal
 from indicial.flightsim.simulate import End, fly, simulate
@@ -61,6 +62,7 @@ __all__ = [
     "DampingChange",
     "DampingCheck",
     "DerivativeAerodynamics",
+    "Dispersion",
     "DrydenTurbulence",
     "Dynamics",
     "Earth",
@@ -75,6 +77,7 @@ __all__ = [
     "LoadFunction",
     "Mode",
     "Modes",
+    "MonteCarlo",
     "Motor",
     "ScheduledStateSpaceAerodynamics",
     "Signal",
@@ -105,6 +108,7 @@ __all__ = [
     "holding_roll",
     "linearise",
     "missile_modes",
+    "monte_carlo",
     "simulate",
     "table",
     "trim",

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from indicial.cfd import FiniteVolumeSolver
+from indicial.cfd import FiniteVolumeSolver, FlowSettings
 from indicial.derivatives import Derivative, DerivativeTable
 from indicial.errors import InputError
 from indicial.methods import forced_oscillation, indicial_response, moving_frame, operator, reduced_frequency
@@ -68,7 +68,9 @@ def compute(piece: Piece, folder: Path | None, progress: Progress | None = None)
         raise InputError(f"no method {piece.method!r} in this study; there are {', '.join(_METHODS)}")
     wall, cpu = time.perf_counter(), time.process_time()
     about = float(piece.settings["moment_reference"])
-    solver = finner_solver(piece.mesh, piece.level, piece.mach, about, folder)
+    usual = FlowSettings()
+    flow = replace(usual, steady_tolerance=piece.settings.get("steady_tolerance", usual.steady_tolerance))
+    solver = finner_solver(piece.mesh, piece.level, piece.mach, about, folder, flow)
     condition = FlightCondition(piece.mach)
     RELAY.listener = progress
     try:
@@ -123,7 +125,8 @@ def _across_fins(solver: FiniteVolumeSolver, condition: FlightCondition, setting
 
 
 def _moving_frame(solver: FiniteVolumeSolver, condition: FlightCondition, settings: dict[str, Any]) -> Found:
-    result = moving_frame.run(solver, condition, ("alpha", "q"))
+    sizes = {**moving_frame.AMPLITUDES, "q": settings.get("pitch_rate", moving_frame.AMPLITUDES["q"])}
+    result = moving_frame.run(solver, condition, ("alpha", "q"), amplitudes=sizes)
     kept = DerivativeTable(tuple(r for r in result.derivatives() if r.name in LONGITUDINAL))
     return Found(kept, {"states": {label: dict(how) for label, how in result.convergence.items()}})
 

@@ -11,7 +11,7 @@ from indicial.conventions import Array
 from indicial.reference_data import read_table
 from indicial.studies.claim import Claim, largest, relative_rms
 from indicial.studies.finner.experiment_figures import THICKNESSES, jump
-from indicial.studies.finner.experiments import INCIDENCES, OF_UNKNOWN_SIZE, SLOW
+from indicial.studies.finner.experiments import INCIDENCES, OF_UNKNOWN_SIZE, SLOW, SMALL_RATES
 from indicial.studies.finner.pieces import OUTLYING
 from indicial.studies.finner.selection import derivative
 from indicial.studies.finner.wedge import sonic_mach
@@ -22,7 +22,35 @@ SUM = "Cm_q+Cm_alphadot"
 
 def claims(results: Results) -> list[Claim]:
     """Reported figures of all experiments."""
-    return [_jump(results), *_outlying(results), _reductions()]
+    return [_jump(results), *_outlying(results), *_small_turns(results), _loose(results), _reductions()]
+
+
+def _small_turns(results: Results) -> list[Claim]:
+    """The moving frame against the operator where its usual rate is too large to be linear, with smaller ones."""
+    listed = []
+    for mach, rates in SMALL_RATES.items():
+        found = [(1e-3, results.select(method="mrf").at(mach))]
+        found += [(rate, results.select(method=f"mrf_rate_{rate:g}").at(mach)) for rate in rates]
+        base = results.select(method="operator", mesh="sting", level="quick").at(mach)
+        title = f"Cm_q at M {mach:g}: MRF against H_q(0), slowest turn"
+        if base is None or any(one is None for _, one in found):
+            listed.append(Claim(title, None, None))
+            continue
+        wanted = derivative(base, "Cm_q", k=None)
+        off = [(rate, derivative(one, "Cm_q") / wanted - 1.0) for rate, one in found if one is not None]
+        said = ", ".join(f"{change:+.2%} at q d/2V = {rate:g}" for rate, change in off)
+        listed.append(Claim(title, abs(off[-1][1]), None, said))
+    return listed
+
+
+def _loose(results: Results) -> Claim:
+    """What a steady state at the looser tolerance does to the damping sum, where the settled one is known."""
+    title = "damping sum at M 4: steady state to 1e-6, not 1e-10"
+    loose = results.select(method="operator_loose").at(4.0)
+    settled = results.select(method="operator", mesh="base", level="medium").at(4.0)
+    if loose is None or settled is None:
+        return Claim(title, None, None)
+    return Claim(title, abs(derivative(loose, SUM, k=None) / derivative(settled, SUM, k=None) - 1.0), None)
 
 
 def _jump(results: Results) -> Claim:

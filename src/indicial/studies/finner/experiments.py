@@ -34,6 +34,9 @@ INCIDENCES = dict.fromkeys((1.077, 1.16, 1.254), (1.0, 2.0)) | dict.fromkeys(OUT
 AMPLITUDES = {1.077: (2.0,), 1.16: (0.5, 1.0, 2.0), 1.254: (2.0,), 2.718: (2.0,), 4.3: (4.5,)}
 """Amplitudes of pitch oscillations [deg]: up to what the flights' mean squared yaw is of a plane motion."""
 
+SMALL_RATES = {1.05: (1e-4, 1e-5), 1.1: (1e-4, 1e-5)}
+"""Reduced pitch rates of moving frames where the usual one is too large to be linear, by Mach number."""
+
 SLOW = (0.0024, 0.004)
 """Reduced frequencies of the flights themselves."""
 
@@ -90,5 +93,22 @@ def _outlying() -> list[Piece]:
     return listed
 
 
-EXPERIMENTS: tuple[Piece, ...] = (*_near_one(), *_about_incidence(), *_of_finite_amplitude(), *_outlying())
+def _small_rates() -> list[Piece]:
+    """Steady turns near M 1, ever slower; and a loose steady state beside a settled one."""
+    turns = [
+        _experiment(f"mrf_rate_{rate:g}", "sting", "quick", mach, pitch_rate=rate)
+        for mach, rates in SMALL_RATES.items()
+        for rate in rates
+    ]
+    loose = _experiment("operator_loose", "base", "medium", 4.0, k=[], steady_tolerance=1e-6)
+    return [*turns, loose]
+
+
+EXPERIMENTS: tuple[Piece, ...] = (
+    *_small_rates(),
+    *_near_one(),
+    *_about_incidence(),
+    *_of_finite_amplitude(),
+    *_outlying(),
+)
 """All of them."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 from functools import lru_cache
 from pathlib import Path
 
-from indicial.cfd import FiniteVolumeSolver
+from indicial.cfd import FiniteVolumeSolver, FlowSettings
 from indicial.cfd.mesh import Mesh, WideDomain, finned_body_mesh
 from indicial.errors import InputError
 from indicial.studies.finner.pieces import DOMAINS
@@ -76,16 +76,22 @@ RELAY = Relay()
 
 
 def finner_solver(
-    kind: str, level: str, mach: float, moment_reference: float, folder: Path | None
+    kind: str,
+    level: str,
+    mach: float,
+    moment_reference: float,
+    folder: Path | None,
+    settings: FlowSettings | None = None,
 ) -> FiniteVolumeSolver:
     """A solver on that mesh; the one before is used again where it is the same, and starts from its nearest state."""
-    return _solver(kind, level, mach if follows_shock(kind) else None, moment_reference, folder)
+    flow = FlowSettings() if settings is None else settings
+    return _solver(kind, level, mach if follows_shock(kind) else None, moment_reference, folder, flow)
 
 
 @lru_cache(maxsize=1)
 def _solver(
-    kind: str, level: str, mach: float | None, moment_reference: float, folder: Path | None
+    kind: str, level: str, mach: float | None, moment_reference: float, folder: Path | None, settings: FlowSettings
 ) -> FiniteVolumeSolver:
     mesh = finner_mesh(kind, level, 0.0 if mach is None else mach)
     states = None if folder is None else folder / "states"
-    return FiniteVolumeSolver(mesh, FINNER.reference(moment_reference), folder=states, progress=RELAY)
+    return FiniteVolumeSolver(mesh, FINNER.reference(moment_reference), settings, folder=states, progress=RELAY)

@@ -70,13 +70,20 @@ def _piece(method: str, kind: str, level: str, mach: float, **settings: Any) -> 
     return Piece(method, kind, level, mach, {**settings, "moment_reference": FINNER_MOMENT_REFERENCE, **domain})
 
 
+LOOSE = {("medium", 4.3): 1e-6}
+"""Tolerances of steady states that do not come to the solver's own: the shocks' cells of this mesh wander below it."""
+
+
 def _sweep() -> list[Piece]:
     """The operator, level by level."""
-    k = list(REDUCED_FREQUENCIES)
     listed = []
     for level in LEVELS:
         for kind, machs in (("base", SUPERSONIC), ("sting", (*TRANSONIC, *OVERLAP))):
-            listed += [_piece("operator", kind, level, mach, k=k) for mach in machs]
+            for mach in machs:
+                settings: dict[str, Any] = {"k": list(REDUCED_FREQUENCIES)}
+                if (level, mach) in LOOSE:
+                    settings["steady_tolerance"] = LOOSE[level, mach]
+                listed.append(_piece("operator", kind, level, mach, **settings))
     return listed
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from indicial.conventions import Array, transfer_longitudinal
 from indicial.errors import InputError
+from indicial.studies.finner.experiments import SMALL_RATES
 from indicial.studies.finner.pieces import LEVELS, LOWEST_WITHOUT_WAKE
 from indicial.studies.grid_convergence import GridConvergence, grid_convergence
 from indicial.studies.kept import Results
@@ -107,7 +108,8 @@ def pairs(
     """
     found = []
     operators = results.select(method="operator")
-    for one in results.select(method=method) if mesh is None else results.select(method=method, mesh=mesh):
+    chosen = results.select(method=method) if mesh is None else results.select(method=method, mesh=mesh)
+    for one in slowest_turns(results, chosen) if method == "mrf" else chosen:
         kind = one.piece.mesh if against is None else against
         base = operators.select(mesh=kind, level=one.piece.level).at(one.piece.mach)
         # a method may refuse a derivative that has no limit
@@ -118,3 +120,16 @@ def pairs(
         size = derivative(base, scale or name, k=k)
         found.append(Pair(one.piece.mach, derivative(one, name, **wanted), derivative(base, name, k=k), size))
     return found
+
+
+def slowest_turns(results: Results, found: Results) -> Results:
+    """Moving frames, each by the slowest turn that was computed at its Mach number.
+
+    Near M 1 the flow is linear in the rate of a steady turn only where that is small: an experiment turns slower.
+    """
+    slowest = {one.piece.mach: one for one in found}
+    for mach, rates in SMALL_RATES.items():
+        for rate in rates:
+            slower = results.select(method=f"mrf_rate_{rate:g}").at(mach)
+            slowest |= {mach: slower} if slower is not None else {}
+    return Results(tuple(slowest[mach] for mach in sorted(slowest)))
