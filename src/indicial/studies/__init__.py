@@ -17,9 +17,10 @@ def find_study(name: str) -> Study:
     from indicial.errors import InputError
     from indicial.studies.bocian import STUDY as BOCIAN
     from indicial.studies.finner import STUDY as FINNER
+    from indicial.studies.freeflight import STUDY as FREEFLIGHT
     from indicial.studies.plate import STUDY as PLATE
 
-    known = {study.name: study for study in (BOCIAN, FINNER, PLATE)}
+    known = {study.name: study for study in (BOCIAN, FINNER, FREEFLIGHT, PLATE)}
     if name not in known:
         raise InputError(f"no study {name!r}; there are {', '.join(known)}")
     return known[name]
