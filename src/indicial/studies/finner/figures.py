@@ -16,7 +16,15 @@ from indicial.studies.finner.axial_force import axial_force
 from indicial.studies.finner.flow_pictures import shock_pattern, surface_pressure
 from indicial.studies.finner.load_pictures import hysteresis, step_responses, time_step
 from indicial.studies.finner.pieces import LEVELS, OVERLAP
-from indicial.studies.finner.selection import OTHER_MOMENT_REFERENCE, about, convergence, derivative, finest, suitable
+from indicial.studies.finner.selection import (
+    OTHER_MOMENT_REFERENCE,
+    about,
+    convergence,
+    derivative,
+    finest,
+    slowest_turns,
+    suitable,
+)
 from indicial.studies.finner.variants import FINNER
 from indicial.studies.kept import Results
 
@@ -78,7 +86,9 @@ def _paper(axes: Axes, figure: int, series: str, label: str, style: str) -> None
 
 
 def _marched(axes: Axes, results: Results, method: str, name: str, label: str, marker: str, colour: str) -> None:
-    found = [r for r in finest(results, method) if r.derivatives.select(name=name).records]
+    best = finest(results, method)
+    best = slowest_turns(results, best) if method == "mrf" else best
+    found = [r for r in best if r.derivatives.select(name=name).records]
     if found:
         value = [derivative(r, name) for r in found]
         axes.plot([r.piece.mach for r in found], value, marker, color=colour, fillstyle="none", label=label)
