@@ -20,11 +20,13 @@ from indicial.flightsim.damping import (
     epicyclic_roots,
     holding_roll,
 )
+from indicial.flightsim.damping_sensitivity import ArmSensitivity, DampingSensitivity, damping_sensitivity
 from indicial.flightsim.dynamics import Dynamics, build_dynamics
 from indicial.flightsim.earth import WGS84, Earth, FlatEarth
 from indicial.flightsim.epicycle import Arm, EpicyclicFit, fit_epicycle, fit_trajectory
 from indicial.flightsim.expressions import ALPHA, ALTITUDE, BETA, MACH, TIME, TOTAL_ANGLE, table
 from indicial.flightsim.forces import Force, FunctionForce, Motor
+from indicial.flightsim.handling_qualities import HandlingQualities, Rating, rate_modes
 from indicial.flightsim.in_flow import LoadFunction, fly_in_flow
 from indicial.flightsim.initial import InitialState
 from indicial.flightsim.modes import LinearModel, Mode, Modes, linearise, missile_modes
@@ -32,6 +34,7 @@ from indicial.flightsim.monte_carlo import Dispersion, MonteCarlo, monte_carlo
 from indicial.flightsim.outputs import OUTPUTS
 from indicial.flightsim.signals import Signal
 from indicial.flightsim.simulate import End, fly, simulate
+from indicial.flightsim.spin_stability import SpinStability, spin_stability
 from indicial.flightsim.state_space import ScheduledStateSpaceAerodynamics, StateSpaceAerodynamics
 from indicial.flightsim.trajectory import Trajectory
 from indicial.flightsim.trim import Trim, Unknown, trim
@@ -55,12 +58,14 @@ __all__ = [
     "Arm",
     "ArmDamping",
     "ArmDifference",
+    "ArmSensitivity",
     "Atmosphere",
     "BodyAxisAerodynamics",
     "ConstantAtmosphere",
     "CosineGust",
     "DampingChange",
     "DampingCheck",
+    "DampingSensitivity",
     "DerivativeAerodynamics",
     "Dispersion",
     "DrydenTurbulence",
@@ -72,6 +77,7 @@ __all__ = [
     "FlowState",
     "Force",
     "FunctionForce",
+    "HandlingQualities",
     "InitialState",
     "LinearModel",
     "LoadFunction",
@@ -79,8 +85,10 @@ __all__ = [
     "Modes",
     "MonteCarlo",
     "Motor",
+    "Rating",
     "ScheduledStateSpaceAerodynamics",
     "Signal",
+    "SpinStability",
     "StandardAtmosphere",
     "StateSpaceAerodynamics",
     "SteadyWind",
@@ -100,6 +108,7 @@ __all__ = [
     "build_dynamics",
     "check_damping",
     "compare",
+    "damping_sensitivity",
     "epicyclic_roots",
     "fit_epicycle",
     "fit_trajectory",
@@ -109,7 +118,9 @@ __all__ = [
     "linearise",
     "missile_modes",
     "monte_carlo",
+    "rate_modes",
     "simulate",
+    "spin_stability",
     "table",
     "trim",
 ]

@@ -168,7 +168,7 @@ def missile_modes(
     initial = InitialState.from_path(speed, rate=(roll_rate, 0.0, 0.0), position=(0.0, 0.0, -altitude))
     values = dynamics.parameter_vector(parameters)
     model = linearise(dynamics, dynamics.initial_vector(initial, values), parameters)
-    planes = _complex_plane(_over_distance(model, speed), dynamics.lag_states // 2)
+    planes = complex_plane(over_distance(model, speed), dynamics.lag_states // 2)
     turning = 1j * roll_rate / speed
     found = [complex(value) + turning for value in np.linalg.eigvals(planes)]
     near = [complex(value) + turning for value in np.linalg.eigvals(_without_lag(planes))]
@@ -179,7 +179,7 @@ def missile_modes(
     return Modes(tuple(Mode(name, value, speed) for name, value in named), speed, roll_rate)
 
 
-def _over_distance(model: LinearModel, speed: float) -> Array:
+def over_distance(model: LinearModel, speed: float) -> Array:
     """The transverse motion over distance, states (v/V, w/V, q/V, r/V, lag pitch, lag yaw)."""
     names = ("v", "w", "q", "r", *model.state_names[13:])
     matrix = model.block(names)
@@ -190,7 +190,7 @@ def _over_distance(model: LinearModel, speed: float) -> Array:
     return carried
 
 
-def _complex_plane(matrix: Array, lags: int) -> Complex:
+def complex_plane(matrix: Array, lags: int) -> Complex:
     """The matrix of (v + iw, q + ir, lag_yaw + i lag_pitch) of a motion that is the same in both planes."""
     y = [0, 2, *range(4 + lags, 4 + 2 * lags)]
     z = [1, 3, *range(4, 4 + lags)]
