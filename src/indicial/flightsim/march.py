@@ -79,7 +79,7 @@ def dop853() -> Tableau:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
-def _feed(drive: Drive, time: float, nudge: float, parameters: Array) -> None:
+def feed(drive: Drive, time: float, nudge: float, parameters: Array) -> None:
     """Write the signals' values into the parameters, from their pieces at ``time + nudge``: a side of a jump."""
     for j in range(drive.which.size):
         start, stop = drive.first[j], drive.first[j + 1]
@@ -104,7 +104,7 @@ def _feed(drive: Drive, time: float, nudge: float, parameters: Array) -> None:
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def _margin(monitor: Code, y: Array, parameters: Array, drive: Drive, time: float, ends: Array, seen: Array) -> float:
     """What is left until the nearest end."""
-    _feed(drive, time, 0.0, parameters)
+    feed(drive, time, 0.0, parameters)
     evaluate_code(monitor, y, parameters, time, seen)
     left = math.inf
     for row in ends:
@@ -127,12 +127,12 @@ def _step(
     """One step of the classical Runge-Kutta method of order 4, from `y` to `after`."""
     n = y.size
     half, sixth = 0.5 * h, h / 6.0
-    _feed(drive, time, _NUDGE * h, parameters)
+    feed(drive, time, _NUDGE * h, parameters)
     evaluate_code(rate, y, parameters, time, k)
     for i in range(n):
         after[i] = y[i] + sixth * k[i]
         stage[i] = y[i] + half * k[i]
-    _feed(drive, time + half, 0.0, parameters)
+    feed(drive, time + half, 0.0, parameters)
     evaluate_code(rate, stage, parameters, time + half, k)
     for i in range(n):
         after[i] += 2.0 * sixth * k[i]
@@ -141,7 +141,7 @@ def _step(
     for i in range(n):
         after[i] += 2.0 * sixth * k[i]
         stage[i] = y[i] + h * k[i]
-    _feed(drive, time + h, -_NUDGE * h, parameters)
+    feed(drive, time + h, -_NUDGE * h, parameters)
     evaluate_code(rate, stage, parameters, time + h, k)
     for i in range(n):
         after[i] += sixth * k[i]
@@ -247,7 +247,7 @@ def _stages(
         for i in range(n):
             stage[i] = y[i] + h * stage[i]
         nudge = -_NUDGE * h if tableau.c[s] == 1.0 else 0.0
-        _feed(drive, time + tableau.c[s] * h, nudge, parameters)
+        feed(drive, time + tableau.c[s] * h, nudge, parameters)
         evaluate_code(rate, stage, parameters, time + tableau.c[s] * h, k[s])
 
 
@@ -352,7 +352,7 @@ def adaptive(
     n = y.size
     k, f, p = np.zeros((16, n)), np.empty((7, n)), parameters.copy()
     time, duration = instants[0], instants[-1] - instants[0]
-    _feed(drive, time, 0.0, p)
+    feed(drive, time, 0.0, p)
     evaluate_code(rate, y, p, time, k[0])
     h = _first_step(rate, y, p, k, relative, absolute, duration)
     times[0], kept, steps, rejected = time, 1, 0, False
@@ -377,7 +377,7 @@ def adaptive(
             for j in range(12):
                 total += tableau.b[j] * k[j, i]
             after[i] = y[i] + h * total
-        _feed(drive, time + h, -_NUDGE * h, p)
+        feed(drive, time + h, -_NUDGE * h, p)
         evaluate_code(rate, after, p, time + h, k[12])
         error = _error(y, after, h, k, tableau.error, relative, absolute)
         if not error < 1.0:  # too large, or not a number
@@ -422,6 +422,6 @@ def adaptive(
             k[0, i] = k[12, i]
         if coming < drive.breaks.size and time == drive.breaks[coming]:
             coming += 1
-            _feed(drive, time, 0.0, p)
+            feed(drive, time, 0.0, p)
             evaluate_code(rate, y, p, time, k[0])  # as it is after the break
     return kept, FLOWN, steps

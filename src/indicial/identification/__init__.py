@@ -2,14 +2,18 @@
 
 from indicial.identification.accuracy import Accuracy, Whiteness
 from indicial.identification.estimate import Estimate
+from indicial.identification.fit import OutputErrorFit, Verdict
 from indicial.identification.instruments import Installation, Sensor, measure_flight
 from indicial.identification.linear_theory import LinearTheory, linear_theory
+from indicial.identification.maximum_likelihood import fit_manoeuvres
 from indicial.identification.measurement import Precision, RangeRecord, measure
 from indicial.identification.output_error import estimate, identify, reduce_linearly, start_values
 from indicial.identification.output_model import FREE_FLIGHT, OutputModel, build_output_model, substeps_needed
+from indicial.identification.problem import Manoeuvre, Parameter
 from indicial.identification.reading import read_flight_record
 from indicial.identification.record import CHANNEL_UNITS, FlightRecord
 from indicial.identification.result import IdentificationResult
+from indicial.identification.sensitivity import SensitivityModel
 
 __all__ = [
     "CHANNEL_UNITS",
@@ -20,13 +24,19 @@ __all__ = [
     "IdentificationResult",
     "Installation",
     "LinearTheory",
+    "Manoeuvre",
+    "OutputErrorFit",
     "OutputModel",
+    "Parameter",
     "Precision",
     "RangeRecord",
+    "SensitivityModel",
     "Sensor",
+    "Verdict",
     "Whiteness",
     "build_output_model",
     "estimate",
+    "fit_manoeuvres",
     "identify",
     "linear_theory",
     "measure",

@@ -1,0 +1,173 @@
+"""What output error found in several records, with its accuracy, residuals and plots."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from indicial.conventions import Array
+from indicial.errors import InputError
+from indicial.identification.coloured import predictors
+from indicial.identification.estimate import Estimate
+from indicial.identification.problem import Manoeuvre
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_SURE = 1.96  # standard errors of a 95% interval
+_UNSEEN = 0.5  # standard error over the larger of the two values, from which nothing is said of it
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """An estimate against a value known before, such as one of CFD.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    before, before_error : float
+        The value and its standard deviation.
+    verdict : {"consistent", "shifted", "unidentifiable"}
+        Within 1.96 standard deviations of both together; beyond; or too uncertain (standard error above half of the
+        larger value) to tell.
+    """
+
+    estimate: Estimate
+    before: float
+    before_error: float
+    verdict: Literal["consistent", "shifted", "unidentifiable"]
+
+    def summary(self) -> str:
+        """One line."""
+        return f"{self.estimate.summary()}   before {self.before:.5g} +- {self.before_error:.2g}: {self.verdict}"
+
+
+@dataclass(frozen=True)
+class OutputErrorFit:
+    """Unknowns of several records.
+
+    Parameters
+    ----------
+    parameters, start_values : tuple of Estimate
+    covariance : ndarray
+        Of all, parameters first: the inverse information under the noise found, shape (n, n).
+    findings : tuple of str
+        What the records cannot tell.
+    noise : dict
+        Of each channel: estimated over stated standard deviation.
+    memory : dict
+        Of each channel: reflection coefficients of its noise, none if white.
+    manoeuvres : tuple of Manoeuvre
+    residuals : tuple of ndarray
+        Of each record: measured less fitted, NaN where nothing was measured, (n, n_channels).
+    white : dict
+        Of each channel: residuals of all records in standard deviations, made white.
+    states : tuple of ndarray
+        Of each record: fitted states (n, nx).
+    starts : dict
+        Where the parameters started.
+    cost : tuple of float
+        J after each step.
+    """
+
+    parameters: tuple[Estimate, ...]
+    start_values: tuple[Estimate, ...]
+    covariance: Array
+    findings: tuple[str, ...]
+    noise: dict[str, float]
+    memory: dict[str, Array]
+    manoeuvres: tuple[Manoeuvre, ...]
+    residuals: tuple[Array, ...]
+    white: dict[str, Array]
+    states: tuple[Array, ...]
+    starts: dict[str, float]
+    cost: tuple[float, ...]
+
+    def __getitem__(self, name: str) -> Estimate:
+        """A parameter or start value by name.
+
+        Raises
+        ------
+        InputError
+            If it was not identified.
+        """
+        for estimate in (*self.parameters, *self.start_values):
+            if estimate.name == name:
+                return estimate
+        raise InputError(f"{name} was not identified; identified were {', '.join(e.name for e in self.parameters)}")
+
+    @property
+    def correlation(self) -> Array:
+        """Correlations of all unknowns, shape (n, n)."""
+        errors = np.sqrt(np.diag(self.covariance))
+        matrix: Array = self.covariance / np.outer(errors, errors)
+        return matrix
+
+    def suspicious(self) -> tuple[str, ...]:
+        """Residuals so large that one among all would be so by chance in a hundred fits, in words.
+
+        Their size is counted in a standard deviation from the median, which outliers do not move.
+        """
+        from scipy.special import ndtri
+
+        found = []
+        total = sum(w.size for w in self.white.values())
+        limit = float(-ndtri(0.005 / total))
+        for channel, white in self.white.items():
+            scale = float(np.median(np.abs(white))) / 0.6745
+            number = int(np.count_nonzero(np.abs(white) > limit * scale)) if scale > 0.0 else 0
+            if number:
+                worst = float(np.max(np.abs(white))) / scale
+                found.append(f"channel {channel}: {number} suspicious residuals, up to {worst:.1f} standard deviations")
+        return tuple(found)
+
+    def against(self, before: Mapping[str, float | tuple[float, float]]) -> tuple[Verdict, ...]:
+        """The parameters against values known before: numbers, or pairs of value and standard deviation."""
+        verdicts = []
+        for name, given in before.items():
+            value, error = given if isinstance(given, tuple) else (given, 0.0)
+            estimate = self[name]
+            if estimate.standard_error > _UNSEEN * max(abs(estimate.value), abs(value)):
+                word: Literal["consistent", "shifted", "unidentifiable"] = "unidentifiable"
+            elif abs(estimate.value - value) <= _SURE * math.hypot(estimate.standard_error, error):
+                word = "consistent"
+            else:
+                word = "shifted"
+            verdicts.append(Verdict(estimate, value, error, word))
+        return tuple(verdicts)
+
+    def summary(self) -> str:
+        """Parameters with standard errors, noise, and what the records cannot tell."""
+        count = sum(int(np.count_nonzero(np.isfinite(r))) for r in self.residuals)
+        lines = [f"output error: {len(self.manoeuvres)} records, {count} measurements, {len(self.cost)} steps"]
+        lines += [f"  {estimate.summary()}" for estimate in self.parameters]
+        for channel, factor in self.noise.items():
+            memory = self.memory[channel]
+            colour = "white" if memory.size == 0 else f"autoregressive, {predictors(memory)[-1][0].round(3).tolist()}"
+            lines.append(f"  noise of {channel}: {factor:.3g} of the stated, {colour}")
+        return "\n".join([*lines, *(f"  {text}" for text in (*self.findings, *self.suspicious()))])
+
+    def plot(self, record: int = 0) -> Figure:
+        """Measured against fitted channels of one record."""
+        import matplotlib.pyplot as plt
+
+        m, residuals = self.manoeuvres[record], self.residuals[record]
+        rows = len(m.model.channels)
+        figure, axes = plt.subplots(
+            rows, 2, figsize=(11, 1.0 + 1.6 * rows), sharex=True, layout="constrained", squeeze=False
+        )
+        for i, channel in enumerate(m.model.channels):
+            axes[i, 0].plot(m.time, m.measured[:, i], ".", ms=2, label="measured")
+            axes[i, 0].plot(m.time, m.measured[:, i] - residuals[:, i], label="fitted")
+            axes[i, 0].set(ylabel=channel)
+            sd = m.standard_deviations[i] * self.noise[channel]
+            axes[i, 1].plot(m.time, residuals[:, i] / sd, ".", ms=2)
+        axes[0, 0].legend(fontsize="small")
+        axes[0, 1].set(title="residual [standard deviations]")
+        for ax in axes[-1]:
+            ax.set(xlabel="time [s]")
+        return figure

@@ -1,0 +1,265 @@
+"""Output error of several records: an aircraft's longitudinal motion, its derivatives as free symbols."""
+
+from functools import cache
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from flightsim.support import FINNER
+from identification.support import MODEL
+from indicial.conventions import ReferenceQuantities
+from indicial.errors import InputError
+from indicial.flightsim import BodyAxisAerodynamics, InitialState, Signal, Vehicle, build_dynamics, fly
+from indicial.flightsim.signals import Schedule
+from indicial.identification import FlightRecord, Manoeuvre, Parameter, SensitivityModel, fit_manoeuvres
+from indicial.identification.coloured import predictors, whiten
+from indicial.identification.maximum_likelihood import Problem
+from indicial.identification.start_state import StartState
+
+TRUTH = {"CZ_alpha": -5.0, "Cm_alpha": -0.8, "Cm_q": -14.0, "Cm_elevator": -1.2}
+CHANNELS = ("alpha", "q", "theta", "az")
+NOISE = {"alpha": 0.002, "q": 0.003, "theta": 0.002, "az": 0.1}
+START = InitialState.from_path(60.0, alpha=0.05)
+
+
+@cache
+def aircraft():
+    reference = ReferenceQuantities(length=1.5, area=16.0, lateral_length=11.0, moment_reference=(0.0, 0.0, 0.0))
+    vehicle = Vehicle(
+        name="light aircraft",
+        reference=reference,
+        mass=1000.0,
+        inertia=np.diag([1200.0, 1800.0, 2700.0]),
+        centre_of_gravity=(0.0, 0.0, 0.0),
+    )
+    free = {name: ca.SX.sym(name) for name in TRUTH}
+    model = BodyAxisAerodynamics(
+        reference=reference,
+        CD_0=0.05,
+        CZ_0=-0.03,
+        CZ_alpha=free["CZ_alpha"],
+        Cm_alpha=free["Cm_alpha"],
+        Cm_q=free["Cm_q"],
+        Cm_0=0.04 + free["Cm_elevator"] * ca.SX.sym("elevator"),
+    )
+    return build_dynamics(vehicle, model)
+
+
+@cache
+def compiled():
+    return SensitivityModel.of(aircraft(), CHANNELS)
+
+
+def simulated(seed=None, memory=0.0, truth=TRUTH, samples=250, duration=10.0, amplitude=0.03):
+    """A record of a 3-2-1-1, its noise of first order with this correlation of neighbours."""
+    time = np.linspace(0.0, duration, samples)
+    sampled = Signal(time, Signal.multistep(amplitude, 0.7, 0.5).at(time))
+    names = compiled().parameter_names
+    schedule = Schedule.of(names, {**truth, "elevator": sampled})
+    start = StartState.of(aircraft(), START, ())
+    steps = np.ones(samples - 1, dtype=np.int64)
+    none = np.full(len(names), -1, dtype=np.int64)
+    state, _ = start.state(np.zeros(0))
+    made = compiled().march(
+        (state, np.zeros((state.size, 0))), schedule.at(0.0)[:, 0], schedule.drive, none, time, steps
+    )
+    outputs = made.outputs.copy()
+    if seed is not None:
+        rng = np.random.default_rng(seed)
+        noise = rng.standard_normal(outputs.shape)
+        for i in range(1, samples):
+            noise[i] = memory * noise[i - 1] + np.sqrt(1.0 - memory**2) * noise[i]
+        outputs += noise * np.array([NOISE[c] for c in CHANNELS])
+    channels = {c: outputs[:, i] for i, c in enumerate(CHANNELS)}
+    return FlightRecord(time, channels, {"elevator": sampled.value}, NOISE)
+
+
+def manoeuvre(record, segments=1, name="record", free=("alpha", "theta", "q")):
+    return Manoeuvre.of_flight(
+        record, aircraft(), START, free_start=free, segments=segments, model=compiled(), name=name
+    )
+
+
+def parameters(factor=1.0, **changes):
+    return [Parameter(name, factor * value, **changes) for name, value in TRUTH.items()]
+
+
+def test_the_march_is_the_flight_that_fly_gives():
+    record = simulated()
+    signal = Signal(record.time, record["elevator"])
+    flown = fly(aircraft(), START, record.time[-1], method="dop853", parameters={**TRUTH, "elevator": signal})
+    last = flown.rate[-1, 1]
+    assert record["q"][-1] == pytest.approx(last, abs=1e-6)
+
+
+def test_sensitivities_equal_differences_of_high_order():
+    problem = Problem([manoeuvre(simulated(), free=("V", "alpha", "theta", "q"))], parameters())
+    slopes = problem.look(problem.start, None).marched[0].slopes
+    exact = slopes[..., np.argsort(problem.records[0].where)]
+    for j, value in enumerate(problem.start):
+        h = np.zeros_like(problem.start)
+        h[j] = 1e-3 * max(0.1, abs(value))
+        near, far = (
+            problem.look(problem.start + n * h, None).marched[0].outputs
+            - problem.look(problem.start - n * h, None).marched[0].outputs
+            for n in (1, 2)
+        )
+        difference = (8.0 * near - far) / (12.0 * h[j])
+        scale = np.max(np.abs(exact[..., j]), axis=0)
+        np.testing.assert_allclose(difference / scale, exact[..., j] / scale, atol=1e-7, err_msg=problem.names[j])
+
+
+def test_what_the_engine_finds_is_what_scipy_finds():
+    """Same weights, no noise model: one and the same least-squares problem."""
+    problem = Problem([manoeuvre(simulated(1))], parameters())
+    found = fit_manoeuvres([manoeuvre(simulated(1))], parameters(), estimate_noise=False)
+    sigma = np.array([NOISE[c] for c in CHANNELS])
+
+    def residuals(x):
+        return (problem.residuals(problem.look(x, None), 0) / sigma).ravel()
+
+    best = least_squares(
+        residuals, problem.start, x_scale=np.maximum(np.abs(problem.start), 0.1), xtol=1e-14, ftol=1e-14
+    )
+    values = [e.value for e in (*found.parameters, *found.start_values)]
+    errors = np.sqrt(np.diag(found.covariance))
+    np.testing.assert_allclose((values - best.x) / errors, 0.0, atol=2e-3)
+    np.testing.assert_allclose(errors, np.sqrt(np.diag(np.linalg.inv(best.jac.T @ best.jac))), rtol=1e-3)
+
+
+@pytest.mark.parametrize("factor", [1.0 / 3.0, 3.0])
+@pytest.mark.parametrize("segments", [1, 10])
+def test_a_start_a_factor_three_off_finds_the_truth_of_records_without_noise(factor, segments):
+    found = fit_manoeuvres([manoeuvre(simulated(), segments)], parameters(factor), estimate_noise=False)
+    for name, value in TRUTH.items():
+        assert found[name].value == pytest.approx(value, rel=1e-5), name
+
+
+def test_multiple_shooting_of_an_unstable_aircraft_finds_what_a_single_shot_finds():
+    """From a start that takes the aircraft for stable: seams change the way to the estimate, not the estimate."""
+    unstable = TRUTH | {"Cm_alpha": 0.5}
+    record = simulated(3, truth=unstable, samples=300, duration=2.5, amplitude=0.005)
+    start = [Parameter(name, -0.8 if name == "Cm_alpha" else value) for name, value in TRUTH.items()]
+    one, many = (fit_manoeuvres([manoeuvre(record, segments)], start) for segments in (1, 12))
+    for name, value in unstable.items():
+        error = one[name].standard_error
+        assert abs(many[name].value - value) < 4.0 * error, name
+        assert many[name].value == pytest.approx(one[name].value, abs=1e-3 * error), name
+
+
+def test_records_share_parameters_and_threads_change_nothing():
+    records = [manoeuvre(simulated(seed), name=f"r{seed}") for seed in (1, 2, 3)]
+    one = fit_manoeuvres(records, parameters(), threads=1)
+    two = fit_manoeuvres(records, parameters(), threads=2)
+    np.testing.assert_array_equal(one.covariance, two.covariance)
+    alone = fit_manoeuvres(records[:1], parameters())
+    ratio = alone["Cm_q"].standard_error / one["Cm_q"].standard_error
+    assert ratio == pytest.approx(np.sqrt(3.0), rel=0.2)
+    own = fit_manoeuvres(records, [*parameters()[:3], Parameter("Cm_elevator", -1.0, per_record=True)])
+    assert own["Cm_elevator[r2]"].value == pytest.approx(-1.2, abs=4 * own["Cm_elevator[r2]"].standard_error)
+
+
+def test_a_prior_and_a_record_weigh_as_two_measurements_do():
+    """A prior far tighter than the record gives its own mean and error back; a loose one changes nothing."""
+    tight = [*parameters()[:3], Parameter("Cm_elevator", -1.2, prior=(-1.25, 1e-6))]
+    found = fit_manoeuvres([manoeuvre(simulated(1))], tight)
+    assert found["Cm_elevator"].value == pytest.approx(-1.25, abs=1e-5)
+    assert found["Cm_elevator"].standard_error == pytest.approx(1e-6, rel=1e-3)
+    loose = [*parameters()[:3], Parameter("Cm_elevator", -1.2, prior=(-1.25, 1e3))]
+    without = fit_manoeuvres([manoeuvre(simulated(1))], parameters())
+    assert fit_manoeuvres([manoeuvre(simulated(1))], loose)["Cm_elevator"].value == pytest.approx(
+        without["Cm_elevator"].value, rel=1e-6
+    )
+
+
+def test_the_filter_makes_first_order_noise_white_exactly():
+    """Its matrix W satisfies W C W' = 1 for the noise's covariance C, the first samples and a gap included."""
+    n, rho = 12, 0.9
+    known = np.ones(n, dtype=bool)
+    known[5] = False
+    filtering = whiten(np.eye(n), np.array([rho]), known)[known][:, known]
+    apart = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
+    covariance = rho**apart
+    covariance[:5, 6:] = covariance[6:, :5] = 0.0  # memory does not reach over a gap
+    covariance = covariance[np.ix_(known, known)]
+    np.testing.assert_allclose(filtering @ covariance @ filtering.T, np.eye(n - 1), atol=1e-12)
+
+
+def test_predictors_solve_the_equations_of_yule_and_walker():
+    phi, variance = predictors(np.array([0.8, -0.3]))[-1]
+    rho1 = phi[0] / (1.0 - phi[1])
+    rho2 = phi[0] * rho1 + phi[1]
+    assert rho1 == pytest.approx(0.8)
+    assert variance == pytest.approx(1.0 - phi[0] * rho1 - phi[1] * rho2)
+
+
+def scaled_errors(seeds, memory):
+    errors, reported = [], []
+    for seed in seeds:
+        found = fit_manoeuvres([manoeuvre(simulated(seed, memory, samples=500))], parameters(), threads=1)
+        errors.append([found[n].value - v for n, v in TRUTH.items()])
+        reported.append([found[n].standard_error for n in TRUTH])
+    return np.array(errors), np.array(reported)
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.9])
+def test_errors_are_of_the_size_reported(memory):
+    from scipy.stats import chi2
+
+    n = 24
+    errors, reported = scaled_errors(range(n), memory)
+    low, high = chi2.ppf([0.0005, 0.9995], n) / n
+    size = np.mean((errors / reported) ** 2, axis=0)
+    assert np.all((size > low) & (size < high))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("memory", [0.0, 0.9])
+def test_intervals_cover_and_standard_errors_match_the_scatter(memory):
+    errors, reported = scaled_errors(range(1000, 1200), memory)
+    coverage = np.mean(np.abs(errors / reported) < 1.96, axis=0)
+    assert np.all((coverage >= 0.90) & (coverage <= 0.98))
+    np.testing.assert_allclose(reported.mean(axis=0), errors.std(axis=0), rtol=0.15)
+
+
+def test_dropouts_outliers_and_a_bias():
+    record = simulated(5)
+    alpha = record["alpha"] + 0.01
+    alpha[40:60] = np.nan
+    q = record["q"].copy()
+    q[100] += 0.1
+    spoilt = record.with_channels(alpha=alpha, q=q)
+    model = SensitivityModel.of(aircraft(), CHANNELS, ["alpha"])
+    m = Manoeuvre.of_flight(
+        spoilt, aircraft(), START, free_start=("alpha", "theta", "q"), biases=["alpha"], model=model
+    )
+    found = fit_manoeuvres([m], [*parameters(), Parameter("bias_alpha", 0.0)])
+    assert found["bias_alpha"].value == pytest.approx(0.01, abs=4 * found["bias_alpha"].standard_error)
+    assert any("channel q" in text for text in found.suspicious())
+    assert found.against({"Cm_q": -14.0, "CZ_alpha": -9.0, "Cm_alpha": (-0.8, 0.1)})[1].verdict == "shifted"
+    assert "Cm_q" in found.summary()
+
+
+def test_what_cannot_be_fitted_is_refused_in_words():
+    record = simulated(5)
+    with pytest.raises(InputError, match="Cm_q of record is neither known nor unknown"):
+        fit_manoeuvres([manoeuvre(record)], [p for p in parameters() if p.name != "Cm_q"])
+    with pytest.raises(InputError, match="in no record's model"):
+        fit_manoeuvres([manoeuvre(record)], [*parameters(), Parameter("Cn_r", 1.0)])
+    dead = record.with_channels(q=np.zeros(len(record)))
+    with pytest.raises(InputError, match="channel q of record does not change"):
+        fit_manoeuvres([manoeuvre(dead)], parameters())
+    still = simulated(5, amplitude=0.0)
+    with pytest.raises(InputError, match="Cm_elevator has no effect"):
+        fit_manoeuvres([manoeuvre(still)], parameters())
+    with pytest.raises(InputError, match="no start value Vx2"):
+        manoeuvre(record, free=("Vx2",))
+
+
+def test_a_range_model_is_seen_through_the_same_channels():
+    dynamics = build_dynamics(FINNER, MODEL)
+    model = SensitivityModel.of(dynamics, ("x", "yaw", "pitch"))
+    state = dynamics.initial_vector(InitialState.from_path(686.0, alpha=0.02))
+    assert model.view(state, ())[:3] == pytest.approx([0.0, 0.0, 0.02])
