@@ -10,6 +10,7 @@ from indicial.flightsim.aerodynamics import (
     Validity,
 )
 from indicial.flightsim.aircraft import BodyAxisAerodynamics
+from indicial.flightsim.aircraft_modes import aircraft_modes
 from indicial.flightsim.atmosphere import Air, Atmosphere, ConstantAtmosphere, StandardAtmosphere, air_at
 from indicial.flightsim.comparison import ArmDifference, TrajectoryComparison, compare
 from indicial.flightsim.damping import (
@@ -29,6 +30,7 @@ from indicial.flightsim.forces import Force, FunctionForce, Motor
 from indicial.flightsim.handling_qualities import HandlingQualities, Rating, rate_modes
 from indicial.flightsim.in_flow import LoadFunction, fly_in_flow
 from indicial.flightsim.initial import InitialState
+from indicial.flightsim.linear import LINEAR_OUTPUTS, LinearFlight, linear_flight
 from indicial.flightsim.modes import LinearModel, Mode, Modes, linearise, missile_modes
 from indicial.flightsim.monte_carlo import Dispersion, MonteCarlo, monte_carlo
 from indicial.flightsim.outputs import OUTPUTS
@@ -47,6 +49,7 @@ __all__ = [
     "ALTITUDE",
     "BETA",
     "DERIVATIVES",
+    "LINEAR_OUTPUTS",
     "MACH",
     "OUTPUTS",
     "TIME",
@@ -79,6 +82,7 @@ __all__ = [
     "FunctionForce",
     "HandlingQualities",
     "InitialState",
+    "LinearFlight",
     "LinearModel",
     "LoadFunction",
     "Mode",
@@ -103,6 +107,7 @@ __all__ = [
     "WindProfile",
     "Winds",
     "air_at",
+    "aircraft_modes",
     "axisymmetric_inertia",
     "basic_finner_range_model",
     "build_dynamics",
@@ -115,6 +120,7 @@ __all__ = [
     "fly",
     "fly_in_flow",
     "holding_roll",
+    "linear_flight",
     "linearise",
     "missile_modes",
     "monte_carlo",

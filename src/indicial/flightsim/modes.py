@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +21,9 @@ from indicial.errors import InputError
 from indicial.flightsim.dynamics import Dynamics
 from indicial.flightsim.epicycle import Complex, order_arms
 from indicial.flightsim.initial import InitialState
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -57,16 +61,24 @@ class Mode:
     Parameters
     ----------
     name : str
-        "fast arm" (nutation), "slow arm" (precession), "roll", "lag 1", ...
+        Of a missile "fast arm" (nutation), "slow arm" (precession), "roll", "lag 1", ...; of an aircraft see
+        `aircraft_modes`.
     eigenvalue : complex
-        [1/s] at `speed`: of angles (and rates over V) over distance, times V; of p over time for roll.
+        [1/s] at `speed`. Of a missile: of angles (and rates over V) over distance, times V; of p over time for roll.
+        Of an aircraft: over time, a pair by the one with positive frequency.
     speed : float
         [m/s].
+    shape : mapping of str to complex
+        Eigenvector of an aircraft's mode by states, the largest of V/speed and the angles scaled to 1.
+    participation : mapping of str to float
+        Share of each state in an aircraft's mode, of sum 1.
     """
 
     name: str
     eigenvalue: complex
     speed: float
+    shape: Mapping[str, complex] = field(default_factory=dict)
+    participation: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def per_metre(self) -> complex:
@@ -85,13 +97,34 @@ class Mode:
 
     @property
     def damping_ratio(self) -> float:
-        """``-Re/|eigenvalue|``."""
-        return -self.eigenvalue.real / abs(self.eigenvalue)
+        """``-Re/|eigenvalue|``; of a mode that neither grows nor turns 0."""
+        size = abs(self.eigenvalue)
+        return -self.eigenvalue.real / size if size else 0.0
+
+    @property
+    def natural_frequency(self) -> float:
+        """``|eigenvalue|`` [rad/s]."""
+        return abs(self.eigenvalue)
+
+    @property
+    def period(self) -> float:
+        """Time of a turn [s], infinite if it does not turn."""
+        return 2.0 * math.pi / abs(self.eigenvalue.imag) if self.eigenvalue.imag else math.inf
+
+    @property
+    def time_to_half(self) -> float:
+        """Time in which it dies down to half [s], infinite if it does not."""
+        return -math.log(2.0) / self.eigenvalue.real if self.eigenvalue.real < 0.0 else math.inf
+
+    @property
+    def time_to_double(self) -> float:
+        """Time in which it grows to the double [s], infinite if it does not."""
+        return math.log(2.0) / self.eigenvalue.real if self.eigenvalue.real > 0.0 else math.inf
 
 
 @dataclass(frozen=True)
 class Modes:
-    """The modes of a missile in straight flight.
+    """The modes of a missile in straight flight, or of an aircraft in steady flight.
 
     Parameters
     ----------
@@ -120,12 +153,51 @@ class Modes:
     def summary(self) -> str:
         """A line for each mode."""
         lines = [f"modes at {self.speed:.5g} m/s, roll rate {self.roll_rate:.5g} rad/s"]
-        lines += [
-            f"  {m.name:<10} damping {m.damping:>12.6g} 1/s  frequency {m.frequency:>12.6g} rad/s  "
-            f"ratio {m.damping_ratio:.4g}"
-            for m in self.modes
-        ]
+        width = max(10, *(len(mode.name) for mode in self.modes))
+        for m in self.modes:
+            line = f"  {m.name:<{width}} damping {m.damping:>12.6g} 1/s  frequency {m.frequency:>12.6g} rad/s  "
+            grows = m.eigenvalue.real > 0.0
+            time = f"doubles in {m.time_to_double:.4g} s" if grows else f"halves in {m.time_to_half:.4g} s"
+            lines.append(f"{line}ratio {m.damping_ratio:.4g}  {time}")
         return "\n".join(lines)
+
+    def plot(self) -> Figure:
+        """Eigenvalues, and the phasors of V/speed and the angles in each mode that oscillates.
+
+        Raises
+        ------
+        InputError
+            If the modes have no shapes, as those of `missile_modes`.
+        """
+        import matplotlib.pyplot as plt
+
+        turning = [mode for mode in self.modes if mode.shape and mode.frequency]
+        if not any(mode.shape for mode in self.modes):
+            raise InputError("these modes have no shapes to draw: those of aircraft_modes have")
+        figure = plt.figure(figsize=(4.2 * (1 + len(turning)), 4.2), layout="constrained")
+        plane = figure.add_subplot(1, 1 + len(turning), 1)
+        for mode in self.modes:
+            plane.plot(mode.damping, mode.frequency, "x", markersize=8, label=mode.name)
+        plane.axvline(0.0, color="0.6", linewidth=0.8)
+        plane.set(xlabel="real part [1/s]", ylabel="imaginary part [rad/s]", title="eigenvalues")
+        plane.legend(fontsize="small")
+        for i, mode in enumerate(turning):
+            axes = figure.add_subplot(1, 1 + len(turning), 2 + i, projection="polar")
+            axes.set_title(f"{mode.name}: {mode.natural_frequency:.3g} rad/s, ratio {mode.damping_ratio:.3g}")
+            for j, (state, value) in enumerate(_phasors(mode).items()):
+                arrow = {"arrowstyle": "-|>", "color": f"C{j}", "shrinkA": 0.0, "shrinkB": 0.0}
+                axes.annotate("", (float(np.angle(value)), abs(value)), (0.0, 0.0), arrowprops=arrow)
+                axes.plot([], [], color=f"C{j}", label=state)
+            axes.set_ylim(0.0, 1.05)
+            axes.legend(fontsize="small", loc="lower left", bbox_to_anchor=(-0.15, -0.15))
+        return figure
+
+
+def _phasors(mode: Mode) -> dict[str, complex]:
+    """What a mode's picture shows: V/speed and angles, those that can be seen."""
+    angles = {name: mode.shape[name] for name in ("alpha", "theta", "beta", "phi") if name in mode.shape}
+    every = {"V/speed": mode.shape["V"] / mode.speed, **angles}
+    return {name: value for name, value in every.items() if abs(value) > 0.01}
 
 
 def linearise(dynamics: Dynamics, state: Array, parameters: Mapping[str, float] | None = None) -> LinearModel:
