@@ -95,3 +95,13 @@ def test_figures_are_drawn_from_what_is_kept(tmp_path) -> None:
     paths = STUDY.draw(KEPT, tmp_path)
     assert {path.name for path in paths} >= {"incidence.png", "frequency.png", "loops.png", "separation.png"}
     assert all(path.stat().st_size > 5000 for path in paths)
+
+
+def test_the_shortfall_at_four_degrees_is_accounted_for() -> None:
+    """Its parts, each from a case of its own, make up the whole; panels, strips and steps are no part of it."""
+    [claim] = [one for one in STUDY.claims(KEPT) if one.name == "the same: what its parts leave unexplained"]
+    assert claim.value is not None
+    assert claim.value < 1e-3
+    rows = KEPT.select(method="shortfall").results[0].provenance["rows"]
+    for case in ("20 strips a half", "6 panels along the chord", "96 steps a period"):
+        assert rows[case] == pytest.approx(rows["base"], rel=2e-3)

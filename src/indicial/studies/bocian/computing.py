@@ -202,6 +202,21 @@ def _rates(piece: Piece, folder: Path | None, progress: Progress) -> Found:
     return records, {"rows": listed}, {}
 
 
+def _shortfall(piece: Piece, folder: Path | None, progress: Progress) -> Found:
+    """Forced roll in attached flow with sections and resolution changed one by one."""
+    settings, rows, records = piece.settings, {}, []
+    listed = {"base": {}, **settings["cases"]}
+    for n, (name, change) in enumerate(listed.items()):
+        forced = {**settings["forced"], **change.get("forced", {})}
+        one = solver({**settings, **change})
+        history, readings = force(one, settings["alpha_deg"], forced)
+        rows[name] = readings["fourier"].value("Cl")
+        if name == "base":
+            records += _forced_row(one, history, readings)[0]
+        progress((n + 1) / len(listed))
+    return records, {"rows": rows}, {}
+
+
 def _rocking(piece: Piece, folder: Path | None, progress: Progress) -> Found:
     settings = piece.settings
     one, inertia = solver(settings), dimensions()["roll_inertia"]
@@ -265,5 +280,6 @@ _METHODS: dict[str, Callable[[Piece, Path | None, Progress], Found]] = {
     "loops": _loops,
     "freedom": _freedom,
     "rates": _rates,
+    "shortfall": _shortfall,
     "rocking": _rocking,
 }

@@ -19,6 +19,7 @@ from indicial.cfd.shapes import LiftingSurface, SpanStation, WingSection
 from indicial.conventions import ReferenceQuantities
 from indicial.motion import FlightCondition
 from indicial.reference_data import data_folder, read_table
+from indicial.studies.bocian.sections import changed
 
 ROOT, TIP, TAIL = (WingSection.naca(digits) for digits in ("43018", "43012", "0012"))
 """Sections; 43018A and 43012A are taken for the plain ones, the tail's is estimated."""
@@ -157,4 +158,5 @@ def solver(settings: dict[str, Any]) -> SectionLatticeSolver:
     others = {"tailplane": 6, "fin": 5}
     lattice = Lattice.of(one.surfaces(), chordwise=int(rows), spanwise={"wing": int(columns), **others}, camber=False)
     lag = SeparationLag(*settings.get("lag", (SeparationLag.delay, SeparationLag.response)))
-    return SectionLatticeSolver(lattice, one.reference, polars(settings["polars"]), SectionSettings(lag))
+    source = changed(polars(settings["polars"]), settings)
+    return SectionLatticeSolver(lattice, one.reference, source, SectionSettings(lag))

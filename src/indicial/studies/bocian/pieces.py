@@ -44,6 +44,21 @@ FREEDOM: dict[str, dict[str, Any]] = {
 }
 """What the choice of the forced oscillation leaves open, changed one by one."""
 
+SHORTFALL: dict[str, dict[str, Any]] = {
+    "slope 2 pi, no drag": {"sections": {"lift": "plate", "drag": False}},
+    "slope 2 pi": {"sections": {"lift": "plate"}},
+    "attached slope of the polars": {"sections": {"lift": "attached"}},
+    "inviscid slope of thick sections": {"sections": {"lift": "joukowski"}},
+    "all chords at Re 0.6e6": {"sections": {"reynolds": 0.6e6}},
+    "all chords at Re 4.2e6": {"sections": {"reynolds": 4.2e6}},
+    "tip's section all over": {"sections": {"section": "naca43012"}},
+    "root's section all over": {"sections": {"section": "naca43018"}},
+    "20 strips a half": {"panels": [3, 20]},
+    "6 panels along the chord": {"panels": [6, 12]},
+    "96 steps a period": {"forced": {"steps_per_period": 96}},
+}
+"""What of the roll damping at 4 degrees comes from what: sections and resolution, changed one by one."""
+
 
 def _piece(method: str, variant: str, level: str, **settings: Any) -> Piece:
     panels = {"panels": COARSE} if level == "coarse" else {}
@@ -61,6 +76,7 @@ PIECES: tuple[Piece, ...] = (
     _piece("loops", "base", "fine", alpha_deg=[4.0, 15.0, 20.0], forced=FORCED),
     _piece("forced", "base", "fine", alpha_deg=[*ALPHAS[:14:2], *ALPHAS[14:]], forced=FORCED),
     _piece("rates", "base", "fine", alpha_deg=[14.0, 16.0, 18.0, 20.0], rates=[0.05, 0.1, 0.2], across=[8, 12, 20]),
+    _piece("shortfall", "base", "fine", alpha_deg=4.0, forced=FORCED, cases=SHORTFALL),
     _piece("freedom", "base", "coarse", alpha_deg=STALL, forced=FORCED, cases=FREEDOM),
     _piece("rocking", "base", "coarse", alpha_deg=[*ALPHAS[4::4], 18.0], first=0.05, end=4.0, step=0.01),
 )
