@@ -1,6 +1,9 @@
 """Derivatives from flight: what a range measures, linear theory, output error, and how well they are determined."""
 
 from indicial.identification.accuracy import Accuracy, Whiteness
+from indicial.identification.coefficients import aerodynamic_coefficient, polynomial_terms, regressor
+from indicial.identification.differentiation import differentiate
+from indicial.identification.equation_error import EquationError, equation_error
 from indicial.identification.estimate import Estimate
 from indicial.identification.fit import OutputErrorFit, Verdict
 from indicial.identification.instruments import Installation, Sensor, measure_flight
@@ -19,6 +22,7 @@ __all__ = [
     "CHANNEL_UNITS",
     "FREE_FLIGHT",
     "Accuracy",
+    "EquationError",
     "Estimate",
     "FlightRecord",
     "IdentificationResult",
@@ -34,15 +38,20 @@ __all__ = [
     "Sensor",
     "Verdict",
     "Whiteness",
+    "aerodynamic_coefficient",
     "build_output_model",
+    "differentiate",
+    "equation_error",
     "estimate",
     "fit_manoeuvres",
     "identify",
     "linear_theory",
     "measure",
     "measure_flight",
+    "polynomial_terms",
     "read_flight_record",
     "reduce_linearly",
+    "regressor",
     "start_values",
     "substeps_needed",
 ]
