@@ -10,7 +10,8 @@ Estimation" (1988), ch. 7), and s^2 is free of bias for this P:
 
 In frequency the data of different frequencies are independent but not equally noisy: the power of the noise at each is
 that of the residuals at it and its neighbours, a quarter of the band together, over the degrees of freedom
-``sum (1 - h)`` that the fit leaves them, h the leverages (in the spirit of MacKinnon & White, J. Econometrics 29 (1985), HC2).
+``sum (1 - h)`` that the fit leaves them, h the leverages (in the spirit of MacKinnon & White, J. Econometrics 29
+(1985), HC2).
 """
 
 from __future__ import annotations
