@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from threadpoolctl import threadpool_limits
 
 from indicial.cfd.lattice.coupling import StripProblem, viscous_loads
 from indicial.cfd.lattice.instant import Instant, StripLoads
@@ -230,7 +231,8 @@ class SectionLatticeSolver:
             raise InputError("times must be finite, start at 0 and increase")
         run = SectionMarch(self, condition, motion)
         velocity, rate = motion.velocity(t), motion.rate(t)
-        loads = np.array([run.step(float(t[n]), velocity[n], rate[n]) for n in range(t.size)])
+        with threadpool_limits(limits=1, user_api="blas"):  # small matrices: threads would only fight
+            loads = np.array([run.step(float(t[n]), velocity[n], rate[n]) for n in range(t.size)])
         if t.size > 1:
             loads[0] = run.first_loads(float(t[1]))
         impulse = run.impulse * 2.0 * condition.speed / self.reference.length

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from threadpoolctl import threadpool_limits
 
 from indicial import __version__
 from indicial.cfd.lattice.influence import Influence
@@ -133,12 +134,13 @@ class LatticeSolver:
         velocity, rate = motion.velocity(t), motion.rate(t)
         loads = np.empty((t.size, 6))
         kept: list[tuple[Instant, Array]] = []
-        for n in range(t.size):
-            instant = march.advance(float(t[n]), self.motion(velocity[n], rate[n]))
-            circulation = instant.circulation()
-            march.accept(circulation)
-            loads[n] = self.coefficients(instant.loads(circulation), condition)
-            kept = [*kept, (instant, circulation)] if n < 2 else kept
+        with threadpool_limits(limits=1, user_api="blas"):  # small matrices: threads would only fight
+            for n in range(t.size):
+                instant = march.advance(float(t[n]), self.motion(velocity[n], rate[n]))
+                circulation = instant.circulation()
+                march.accept(circulation)
+                loads[n] = self.coefficients(instant.loads(circulation), condition)
+                kept = [*kept, (instant, circulation)] if n < 2 else kept
         if t.size > 1:
             (first, after_jump), (_, later) = kept
             loads[0] = self.coefficients(first.loads(after_jump, (later - after_jump) / t[1]), condition)
