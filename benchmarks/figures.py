@@ -31,7 +31,7 @@ class Figure:
         """The figure for a reader."""
         verdict = "" if self.holds is None else ("  holds" if self.holds else "  FALLS SHORT")
         wanted = "" if self.target is None else f"  (asked: {self.target})"
-        return f"{self.name:<52}{self.value:>10.3g} {self.unit}{wanted}{verdict}"
+        return f"{self.name:<60}{self.value:>10.3g} {self.unit}{wanted}{verdict}"
 
 
 def best_time(action: Callable[[], object], repeats: int = 7, clock: Callable[[], float] = time.perf_counter) -> float:

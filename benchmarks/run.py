@@ -1,7 +1,7 @@
 """Run a benchmark: ``python benchmarks/run.py`` lists them, ``python benchmarks/run.py NAME`` runs one.
 
 A benchmark is a file beside this one with a docstring and a function ``measure() -> list[Figure]``; an underscore
-stands behind a name that Python's own library has. Each figure that has a target is a ratio against a peer or a limit
+stands behind a name that another module has. Each figure that has a target is a ratio against a peer or a limit
 that is measured in the same run, so it holds on any machine. The last line printed is JSON:
 ``{"benchmark", "figures": [{"name", "value", "unit", "target", "holds"}]}``.
 """

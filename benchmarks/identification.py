@@ -1,0 +1,36 @@
+"""Identification: time of an output-error fit, beside aeroid's on the same record.
+
+500 samples of four channels, four derivatives, the initial state known, from start values 30% off. Ours estimates the
+size and the colour of the noise besides; the peer takes it as stated. On one thread. The peer is left out where it is
+not installed.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import time
+
+from figures import Figure, best_time
+from peers import longitudinal
+
+FAR = 1.3
+
+
+def measure() -> list[Figure]:
+    """The fit, then the peer's."""
+    record = longitudinal.record(seed=1, memory=0.0)
+    ours = best_time(lambda: longitudinal.fit(record, start_known=True, factor=FAR))
+    figures = [Figure("output error, 500 samples and 4 parameters", 1e3 * ours, "ms")]
+    if importlib.util.find_spec("aeroid") is None:
+        return [*figures, Figure("aeroid is not installed: not compared", math.nan, "")]
+    start = time.perf_counter()
+    peer = longitudinal.peer_fit(record, FAR)
+    taken = time.perf_counter() - start
+    found = longitudinal.fit(record, start_known=True, factor=FAR)
+    apart = max(abs(found[n].value - peer.parameters[n]) / peer.stderr[n] for n in longitudinal.TRUTH)
+    return [
+        *figures,
+        Figure.at_least("aeroid's output error over ours", taken / ours, 15.0),
+        Figure.at_most("estimates apart, in standard errors", apart, 0.5),
+    ]
