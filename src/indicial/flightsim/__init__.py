@@ -22,6 +22,7 @@ from indicial.flightsim.damping import (
     holding_roll,
 )
 from indicial.flightsim.damping_sensitivity import ArmSensitivity, DampingSensitivity, damping_sensitivity
+from indicial.flightsim.deficiency import DeficiencyAerodynamics, DeficiencyTerm
 from indicial.flightsim.dynamics import Dynamics, build_dynamics
 from indicial.flightsim.earth import WGS84, Earth, FlatEarth
 from indicial.flightsim.epicycle import Arm, EpicyclicFit, fit_epicycle, fit_trajectory
@@ -69,6 +70,8 @@ __all__ = [
     "DampingChange",
     "DampingCheck",
     "DampingSensitivity",
+    "DeficiencyAerodynamics",
+    "DeficiencyTerm",
     "DerivativeAerodynamics",
     "Dispersion",
     "DrydenTurbulence",

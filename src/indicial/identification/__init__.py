@@ -7,6 +7,7 @@ from indicial.identification.equation_error import EquationError, equation_error
 from indicial.identification.estimate import Estimate
 from indicial.identification.fit import OutputErrorFit, Verdict
 from indicial.identification.instruments import Installation, Sensor, measure_flight
+from indicial.identification.lag_support import LagSupport, lag_support
 from indicial.identification.linear_theory import LinearTheory, linear_theory
 from indicial.identification.maximum_likelihood import fit_manoeuvres
 from indicial.identification.measurement import Precision, RangeRecord, measure
@@ -27,6 +28,7 @@ __all__ = [
     "FlightRecord",
     "IdentificationResult",
     "Installation",
+    "LagSupport",
     "LinearTheory",
     "Manoeuvre",
     "OutputErrorFit",
@@ -45,6 +47,7 @@ __all__ = [
     "estimate",
     "fit_manoeuvres",
     "identify",
+    "lag_support",
     "linear_theory",
     "measure",
     "measure_flight",
