@@ -36,7 +36,9 @@ def claims(results: Results) -> tuple[Claim, ...]:
         _attached(frame, forced),
         *_stalled(frame, forced),
         _meeting(piece(results, "frame", mesh="beyond"), piece(results, "forced", mesh="beyond"), forced),
-        _rocking(frame, forced, rocking),
+        _rocking(
+            (frame, piece(results, "frame", mesh="beyond")), (forced, piece(results, "forced", mesh="beyond")), rocking
+        ),
         _freedom(piece(results, "freedom")),
         _states(frame),
         _rates(piece(results, "rates")),
@@ -167,11 +169,14 @@ def _meeting(frame: PieceResult | None, swung: PieceResult | None, forced: Piece
     return Claim(name, abs(two - one) / abs(by_alpha(forced, "fourier")[4.0]), None, said)
 
 
-def _rocking(frame: PieceResult | None, forced: PieceResult | None, rocking: PieceResult | None) -> Claim:
+def _rocking(
+    frame: tuple[PieceResult | None, ...], forced: tuple[PieceResult | None, ...], rocking: PieceResult | None
+) -> Claim:
     name = "incidences at which free rocking contradicts MRF and FOM both"
-    if frame is None or forced is None or rocking is None:
+    if None in (*frame, *forced) or rocking is None:
         return Claim(name, None, 0.0, unit="")
-    steady, swung = by_alpha(frame, "one_sided"), by_alpha(forced, "fourier")
+    steady = {alpha: value for one in frame if one for alpha, value in by_alpha(one, "one_sided").items()}
+    swung = {alpha: value for one in forced if one for alpha, value in by_alpha(one, "fourier").items()}
     judged, against = [], []
     for row in rows(rocking):
         alpha = float(row["alpha_deg"])
@@ -180,7 +185,9 @@ def _rocking(frame: PieceResult | None, forced: PieceResult | None, rocking: Pie
             if bool(row["autorotates"]) != (swung[alpha] > 0.0):
                 against.append(alpha)
     said = ", ".join(f"{alpha:g} deg" for alpha in against) or "none"
-    return Claim(name, float(len(against)), 0.0, f"{said} of {len(judged)}", unit="")
+    both = ", ".join(f"{alpha:g}" for alpha in judged if swung[alpha] > 0.0) or "none"
+    note = f"{said} of {len(judged)}; both say autorotation at {both} deg"
+    return Claim(name, float(len(against)), 0.0, note, unit="")
 
 
 def _freedom(freedom: PieceResult | None) -> Claim:

@@ -61,7 +61,7 @@ def _incidence(results: Results, plt: Any) -> Figure:
         axes.plot(list(further), list(further.values()), "v:", color=PURPLE, label="FOM, fourier, beyond the paper")
     if free is not None:
         other = by_alpha(free, "one_sided")
-        axes.plot(list(other), list(other.values()), ":", color=BLUE, label="the same, free transition")
+        axes.plot(list(other), list(other.values()), "--", color=SKY, lw=1.2, label="MRF, free transition")
     for reduction in REDUCTIONS:
         found = by_alpha(forced, reduction)
         axes.plot(
@@ -102,10 +102,13 @@ def _loops(result: PieceResult, plt: Any) -> Figure:
     for ax, alpha in zip(axes, result.piece.settings["alpha_deg"], strict=True):
         history = History.from_netcdf(result.file(f"alpha_{alpha:g}"))
         amplitude, omega = history.motion["amplitude"], history.motion["omega"]
-        ax.plot(np.degrees(amplitude * np.sin(omega * history.time)), history["Cl"], color=ORANGE)
+        roll = np.degrees(amplitude * np.sin(omega * history.time))
+        ax.plot(roll, history["Cl"], color=ORANGE)
+        ax.plot(roll[0], history["Cl"][0], "o", color=BLACK, ms=5, label="start")
         ax.set_title(f"alpha {alpha:g} deg")
         ax.set_xlabel("angle of roll [deg]")
     axes[0].set_ylabel("Cl, on half the span")
+    axes[0].legend(fontsize=8, loc="center")
     return figure
 
 
@@ -127,6 +130,10 @@ def _separation(result: PieceResult, plt: Any) -> Figure:
             ax.set_title(f"alpha {alpha:g} deg, {title}", fontsize=9)
     for ax in axes[-1]:
         ax.set_xlabel("y [m], right wing at y > 0")
+    for ax in axes[:, 0]:
+        ax.set_ylabel("-x [m]")
+    handles = [plt.Rectangle((0, 0), 1, 1, color=colour) for colour in (VERMILION, BLUE)]
+    figure.legend(handles, ["attached", "separated"], loc="outside upper center", ncols=2, fontsize=9)
     return figure
 
 
@@ -174,11 +181,11 @@ def _rocking(result: PieceResult, plt: Any) -> Figure:
     figure: Figure
     figure, axes = plt.subplots(figsize=(7.0, 4.2))
     cycle = (BLUE, SKY, GREEN, PURPLE, ORANGE, VERMILION, BLACK)
-    for n, row in enumerate(rows(result)):
+    for n, row in enumerate(sorted(rows(result), key=lambda row: float(row["alpha_deg"]))):
         dashes = "-" if row["autorotates"] else ":"
         axes.plot(row["time_s"], row["p"], dashes, color=cycle[n % 7], label=f"{row['alpha_deg']:g} deg")
     axes.axhline(0.0, color=GREY, lw=0.8)
     axes.set_xlabel("time after release [s]")
     axes.set_ylabel("rate of roll [rad/s]")
-    axes.legend(fontsize=8, ncols=2)
+    axes.legend(fontsize=8, ncols=2, title="solid: autorotates", title_fontsize=8)
     return figure

@@ -78,6 +78,6 @@ PIECES: tuple[Piece, ...] = (
     _piece("rates", "base", "fine", alpha_deg=[14.0, 16.0, 18.0, 20.0], rates=[0.05, 0.1, 0.2], across=[8, 12, 20]),
     _piece("shortfall", "base", "fine", alpha_deg=4.0, forced=FORCED, cases=SHORTFALL),
     _piece("freedom", "base", "coarse", alpha_deg=STALL, forced=FORCED, cases=FREEDOM),
-    _piece("rocking", "base", "coarse", alpha_deg=[*ALPHAS[4::4], 18.0], first=0.05, end=4.0, step=0.01),
+    _piece("rocking", "base", "coarse", alpha_deg=[*ALPHAS[4::4], 18.0, 19.0, 22.0], first=0.05, end=4.0, step=0.01),
 )
 """All of them."""
