@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -167,24 +167,79 @@ class AlphaStep(Motion):
 
 
 @dataclass(frozen=True)
-class PitchRateStep(Motion):
-    """A jump of omega with V_b constant in body axes: q changes from 0 to `rate_amplitude` [rad/s] at t = 0."""
+class SideslipStep(Motion):
+    """A jump of V_b at constant attitude: beta changes by `amplitude` [rad] at t = 0 (no rotation)."""
+
+    condition: FlightCondition
+    amplitude: float
+
+    def velocity(self, time: ArrayLike) -> Array:
+        c = self.condition
+        after = velocity_from_angles(c.speed, c.alpha, c.beta + self.amplitude)
+        return np.broadcast_to(after, (*np.shape(time), 3)).copy()
+
+    def rate(self, time: ArrayLike) -> Array:
+        return np.zeros((*np.shape(time), 3))
+
+    @property
+    def velocity_before(self) -> Array:
+        return self.condition.velocity
+
+    def describe(self) -> dict[str, Any]:
+        return {"kind": "beta_step", "amplitude": self.amplitude}
+
+
+@dataclass(frozen=True)
+class RateStep(Motion):
+    """A jump of omega with V_b constant in body axes: one rate changes from 0 to `rate_amplitude` [rad/s] at t = 0."""
 
     condition: FlightCondition
     rate_amplitude: float
+
+    axis: ClassVar[Literal["p", "q", "r"]]
+    kind: ClassVar[str]
+
+    @property
+    def rates(self) -> Rates:
+        """After the step."""
+        return Rates(**{self.axis: self.rate_amplitude})
 
     def velocity(self, time: ArrayLike) -> Array:
         return np.broadcast_to(self.condition.velocity, (*np.shape(time), 3)).copy()
 
     def rate(self, time: ArrayLike) -> Array:
-        return np.broadcast_to(np.array([0.0, self.rate_amplitude, 0.0]), (*np.shape(time), 3)).copy()
+        return np.broadcast_to(self.rates.as_array(), (*np.shape(time), 3)).copy()
 
     @property
     def rate_before(self) -> Array:
         return np.zeros(3)
 
     def describe(self) -> dict[str, Any]:
-        return {"kind": "pitch_rate_step", "rate_amplitude": self.rate_amplitude}
+        return {"kind": self.kind, "rate_amplitude": self.rate_amplitude}
+
+
+@dataclass(frozen=True)
+class RollRateStep(RateStep):
+    """A step in p."""
+
+    axis = "p"
+    kind = "roll_rate_step"
+
+
+@dataclass(frozen=True)
+class PitchRateStep(RateStep):
+    """A step in q."""
+
+    axis = "q"
+    kind = "pitch_rate_step"
+
+
+@dataclass(frozen=True)
+class YawRateStep(RateStep):
+    """A step in r."""
+
+    axis = "r"
+    kind = "yaw_rate_step"
 
 
 @dataclass(frozen=True)

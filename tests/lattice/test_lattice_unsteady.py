@@ -180,6 +180,43 @@ def test_indicial_derivatives_are_those_of_the_linear_response() -> None:
         assert abs(gap) < 0.15 * abs(impulse)
 
 
+def test_lateral_steps_have_the_derivatives_of_the_linear_response() -> None:
+    """Steps in beta, p and r of a wing with dihedral and a fin: limits, betadot, and the loads a step does not move."""
+    wing = LiftingSurface.wing("wing", 6.0, 1.0, dihedral=0.1)
+    fin = LiftingSurface("fin", (SpanStation(2.0, 0.0, 0.2, 0.6), SpanStation(2.2, 0.0, 1.0, 0.4)), symmetric=False)
+    lattice = Lattice.of([wing, fin], chordwise=6, spanwise=5)
+    solver = LatticeSolver(lattice, wing.reference((0.25, 0.0, 0.0)), LatticeSettings(compressible=False))
+    s = indicial_response.step_times(0.15, 1.07, 2.0, 160.0)
+    response = solver.frequency_response(STILL, (), ("beta", "p", "r"))
+    steps = {}
+    for kind, size in (("beta", 0.005), ("p", 0.005), ("r", 0.005)):
+        history = indicial_response.run(solver, STILL, size, s, kind)  # type: ignore[arg-type]
+        condition, rates = indicial_response.after(
+            indicial_response.experiment(STILL, solver.reference, size, kind)  # type: ignore[arg-type]
+        )
+        steps[kind] = indicial_response.read(history, solver.steady(condition, rates))
+        assert steps[kind].kind == kind
+        for load in ("CY", "Cl", "Cn"):
+            exact = response.at_zero(load, kind)[0]
+            assert steps[kind][load][-1] == pytest.approx(exact, rel=2e-3, abs=2e-3)
+        opposite = indicial_response.run(solver, STILL, -size, s[:12], kind)  # type: ignore[arg-type]
+        mirrored = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0]) * opposite.coefficients
+        assert mirrored == pytest.approx(history.coefficients[:12], abs=1e-12)
+    found = indicial_response.derive_lateral(steps["beta"], steps["p"], steps["r"], noise=1e-6)
+    table = operator.derivatives(response)
+    for load in ("CY", "Cl", "Cn"):
+        for motion in ("beta", "p", "r"):
+            assert found[f"{load}_{motion}"] == pytest.approx(response.at_zero(load, motion)[0], rel=1e-3, abs=1e-4)
+        exact = table.value(f"{load}_betadot", k=None)
+        impulse = steps["beta"].impulse[load] * float(
+            solver.reference.moment_lengths[1] / solver.reference.moment_lengths[0]
+        )
+        assert abs(found[f"{load}_betadot"] - exact) < 0.15 * abs(impulse) + 0.02 * abs(exact)
+    assert found.derivatives().value("Cl_p") == found["Cl_p"]
+    with pytest.raises(InputError, match="derive_lateral needs"):
+        indicial_response.derive_lateral(steps["p"])
+
+
 @pytest.mark.parametrize("alpha", [0.0, 0.08])
 def test_state_space_is_the_march_with_a_frozen_wake(alpha: float) -> None:
     solver = tailed("frozen", chordwise=2, spanwise=3)

@@ -11,7 +11,7 @@ from indicial.cfd.lattice.coupling import StripProblem
 from indicial.cfd.lattice.polars import Polar
 from indicial.cfd.shapes import LiftingSurface
 from indicial.errors import InputError
-from indicial.methods import moving_frame
+from indicial.methods import indicial_response, moving_frame
 from indicial.motion import AlphaStep, FlightCondition, Rates, RollOscillation, SteadyMotion
 from indicial.solver import Solver
 from lattice.sections import linear, stalling, tables
@@ -161,6 +161,19 @@ def test_methods_run_on_it_unchanged() -> None:
     central = moving_frame.run(one, CONDITION, ("p",), second=None)
     one_sided = moving_frame.run(one, CONDITION, ("p",), second=None, one_sided=True)
     assert central["Cl_p"] == pytest.approx(one_sided["Cl_p"], rel=1e-2)
+
+
+@pytest.mark.parametrize("kind", ["alpha", "beta", "p", "q", "r"])
+def test_steps_of_every_kind_settle_on_the_steady_state_after_them(kind: str) -> None:
+    one = solver(stalling())
+    size = 0.01
+    s = indicial_response.step_times(0.3, 1.15, 4.0, 120.0)
+    history = indicial_response.run(one, CONDITION, size, s, kind)  # type: ignore[arg-type]
+    step = indicial_response.experiment(CONDITION, one.reference, size, kind)  # type: ignore[arg-type]
+    response = indicial_response.read(history, one.steady(*indicial_response.after(step)))
+    load = {"alpha": "CN", "q": "CN"}.get(kind, "Cl")
+    assert response[load][-1] == pytest.approx(response.final[load], rel=0.01)
+    assert load in response.summary()
 
 
 def test_camber_and_missing_data_are_refused() -> None:

@@ -1,8 +1,8 @@
-r"""Indicial responses: steps in alpha and in q, and the derivatives in them (Eqs. 13-17).
+r"""Indicial responses: steps in alpha, beta, p, q and r, and the derivatives in them (Eqs. 13-17).
 
-Also called IRM. A step in alpha is a jump of V_b at constant attitude, a step in q a jump of the rate at constant
-V_b in body axes. Per unit step, a load's response starts at its piston value, tends to ``C_ja`` or ``C_jq``, and the
-area it lacks on the way is ``C_jad = -integral_0^inf F_ja ds`` per ``alphadot c/2U`` (Eq. 17), s = 2Ut/c.
+Also called IRM. A step in alpha or beta is a jump of V_b at constant attitude, a step in a rate a jump of it at
+constant V_b in body axes. Per unit step, a load's response starts at its piston value, tends to ``C_ja`` or ``C_jq``,
+and the area it lacks on the way is ``C_jad = -integral_0^inf F_ja ds`` per ``alphadot c/2U`` (Eq. 17), s = 2Ut/c.
 The integral is taken by `indicial.rom.deficiency`, which refuses it where it has no limit.
 """
 
@@ -18,17 +18,35 @@ from indicial.conventions import COEFFICIENTS, Array, ReferenceQuantities, time_
 from indicial.derivatives import Derivative, DerivativeTable
 from indicial.errors import InputError, NoLimitError
 from indicial.history import History
-from indicial.motion import AlphaStep, FlightCondition, PitchRateStep, Rates
+from indicial.motion import (
+    AlphaStep,
+    FlightCondition,
+    PitchRateStep,
+    Rates,
+    RateStep,
+    RollRateStep,
+    SideslipStep,
+    YawRateStep,
+)
 from indicial.rom.deficiency import DeficiencyIntegral, deficiency, deficiency_integral
 from indicial.solver import Solver, SteadyLoads
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-StepKind = Literal["alpha", "q"]
+StepKind = Literal["alpha", "beta", "p", "q", "r"]
+Step = AlphaStep | SideslipStep | RateStep
 
 LOADS = ("CN", "Cm")
-"""Loads whose derivatives are found."""
+"""Loads whose longitudinal derivatives are found."""
+
+LATERAL_LOADS = ("CY", "Cl", "Cn")
+"""Loads whose lateral derivatives are found."""
+
+_BY_INCIDENCE = ("_alpha", "_alphadot", "_beta", "_betadot")
+_INCIDENCE: dict[str, type[AlphaStep | SideslipStep]] = {"alpha": AlphaStep, "beta": SideslipStep}
+_RATE: dict[str, type[RateStep]] = {step.axis: step for step in (RollRateStep, PitchRateStep, YawRateStep)}
+_KINDS = {"alpha_step": "alpha", "beta_step": "beta", **{step.kind: step.axis for step in _RATE.values()}}
 
 
 @dataclass(frozen=True)
@@ -37,8 +55,8 @@ class StepResponse:
 
     Parameters
     ----------
-    kind : {"alpha", "q"}
-        Per rad, or per unit of the pitch rate reduced as `reference` says.
+    kind : {"alpha", "beta", "p", "q", "r"}
+        Per rad, or per unit of the rate reduced as `reference` says.
     amplitude : float
         Of the step that was made [rad, or reduced rate]; of a pair, its largest.
     s : ndarray
@@ -93,12 +111,17 @@ class StepResponse:
         found = deficiency_integral(self.s, self[name], self.final.get(name), noise=noise, name=label)
         return replace(found, value=found.value - self.impulse.get(name, 0.0))
 
-    def plot(self, names: tuple[str, ...] = LOADS, ax: Axes | None = None) -> Axes:
-        """Responses per unit step against reduced time."""
+    @property
+    def loads(self) -> tuple[str, ...]:
+        """What a step of this kind moves."""
+        return LOADS if self.kind in ("alpha", "q") else LATERAL_LOADS
+
+    def plot(self, names: tuple[str, ...] | None = None, ax: Axes | None = None) -> Axes:
+        """Responses per unit step against reduced time; of `loads`, if not named."""
         import matplotlib.pyplot as plt
 
         axes: Axes = plt.subplots()[1] if ax is None else ax
-        for name in names:
+        for name in self.loads if names is None else names:
             axes.plot(self.s, self[name], label=name)
         axes.set_xlabel("reduced time s = 2Ut/c")
         axes.set_ylabel(f"response per unit {self.kind}")
@@ -108,7 +131,7 @@ class StepResponse:
     def summary(self) -> str:
         """One line a load."""
         rows = [f"step in {self.kind} of {self.amplitude:.3g} at M {self.condition.mach:g}, to s = {self.s[-1]:.4g}"]
-        rows += [f"{name}: {self.initial(name):.6g} at 0+, {self.limit(name)[0]:.6g} in the end" for name in LOADS]
+        rows += [f"{name}: {self.initial(name):.6g} at 0+, {self.limit(name)[0]:.6g} in the end" for name in self.loads]
         return "\n".join(rows)
 
 
@@ -119,8 +142,8 @@ class IndicialResult:
     Parameters
     ----------
     values : dict
-        By name: ``CN_alpha``, ``CN_q``, ``CN_alphadot``, ``CN_q+CN_alphadot``, and Cm likewise; rates as `reference`
-        normalises them.
+        By name: ``CN_alpha``, ``CN_q``, ``CN_alphadot``, ``CN_q+CN_alphadot``, and Cm likewise; or ``CY_beta``,
+        ``CY_betadot``, ``CY_p``, ``CY_r``, and Cl and Cn likewise; rates as `reference` normalises them.
     uncertainties : dict
         By name, None where not known: tail, quadrature, and the change at the second amplitude.
     refused : dict
@@ -128,7 +151,7 @@ class IndicialResult:
     integrals : dict
         The deficiency integral of each load.
     amplitude : float
-        Of the step in alpha [rad].
+        Of the step in alpha or beta [rad].
     condition : FlightCondition
     reference : ReferenceQuantities
     """
@@ -160,7 +183,7 @@ class IndicialResult:
                     value,
                     source,
                     uncertainty=self.uncertainties[name],
-                    amplitude=self.amplitude if name.endswith(("_alpha", "_alphadot")) and "+" not in name else None,
+                    amplitude=self.amplitude if name.endswith(_BY_INCIDENCE) and "+" not in name else None,
                 )
                 for name, value in self.values.items()
             )
@@ -203,22 +226,35 @@ def step_times(first: float, growth: float, largest: float, end: float) -> Array
 
 def experiment(
     condition: FlightCondition, reference: ReferenceQuantities, amplitude: float, kind: StepKind = "alpha"
-) -> AlphaStep | PitchRateStep:
-    """The step: `amplitude` in rad of alpha, or in reduced pitch rate as `reference` normalises it."""
-    if kind not in ("alpha", "q"):
-        raise InputError(f"no step in {kind!r}; there are alpha and q")
+) -> Step:
+    """The step: `amplitude` in rad of alpha or beta, or in a reduced rate as `reference` normalises it.
+
+    Raises
+    ------
+    InputError
+        If there is no such step, or no amplitude.
+    """
+    if kind not in (*_INCIDENCE, *_RATE):
+        raise InputError(f"no step in {kind!r}; there are {', '.join((*_INCIDENCE, *_RATE))}")
     if not (np.isfinite(amplitude) and amplitude != 0.0):
         raise InputError(f"step amplitude is {amplitude}, must be finite and not zero")
-    if kind == "alpha":
-        return AlphaStep(condition, amplitude)
-    return PitchRateStep(condition, amplitude / float(reference.rate_scale(condition.speed)[1]))
+    if kind in _INCIDENCE:
+        return _INCIDENCE[kind](condition, amplitude)
+    return _RATE[kind](condition, amplitude / _rate_scale(kind, condition, reference))
 
 
-def after(step: AlphaStep | PitchRateStep) -> tuple[FlightCondition, Rates]:
+def _rate_scale(kind: str, condition: FlightCondition, reference: ReferenceQuantities) -> float:
+    """Seconds that make a rate dimensionless."""
+    return float(reference.rate_scale(condition.speed)["pqr".index(kind)])
+
+
+def after(step: Step) -> tuple[FlightCondition, Rates]:
     """The steady state to which a step leads; its loads give C(inf)."""
     if isinstance(step, AlphaStep):
         return replace(step.condition, alpha=step.condition.alpha + step.amplitude), Rates()
-    return step.condition, Rates(q=step.rate_amplitude)
+    if isinstance(step, SideslipStep):
+        return replace(step.condition, beta=step.condition.beta + step.amplitude), Rates()
+    return step.condition, step.rates
 
 
 def run(solver: Solver, condition: FlightCondition, amplitude: float, s: Array, kind: StepKind = "alpha") -> History:
@@ -233,21 +269,19 @@ def read(history: History, final: SteadyLoads | Mapping[str, float] | None = Non
     Parameters
     ----------
     history : History
-        Of a step in alpha or q.
+        Of a step.
     final : SteadyLoads or mapping, optional
         The steady loads of `after`, from the solver that made the history; or C(inf) per unit step (the
         derivatives) by load. Without it, it is estimated from the record.
     """
     step = history.motion.get("kind")
-    if step == "alpha_step":
-        kind: StepKind = "alpha"
+    if step not in _KINDS:
+        raise InputError(f"a history of {step!r} is no step; those are {', '.join(_KINDS)}")
+    kind: StepKind = _KINDS[step]  # type: ignore[assignment]
+    if kind in _INCIDENCE:
         amplitude = float(history.motion["amplitude"])
-    elif step == "pitch_rate_step":
-        kind = "q"
-        scale = float(history.reference.rate_scale(history.condition.speed)[1])
-        amplitude = float(history.motion["rate_amplitude"]) * scale
     else:
-        raise InputError(f"a history of {step!r} is no step; those are alpha_step and pitch_rate_step")
+        amplitude = float(history.motion["rate_amplitude"]) * _rate_scale(kind, history.condition, history.reference)
     if isinstance(final, SteadyLoads):
         limits = (final.coefficients - history.before) / amplitude
         final = dict(zip(COEFFICIENTS, limits.tolist(), strict=True))
@@ -308,28 +342,81 @@ def derive(
     """
     if alpha.kind != "alpha" or (q is not None and q.kind != "q"):
         raise InputError("derive needs a step in alpha, and then one in q")
-    values: dict[str, float] = {}
-    spreads: dict[str, float | None] = {}
-    refused: dict[str, str] = {}
-    integrals: dict[str, DeficiencyIntegral] = {}
+    found = _Found({}, {}, {}, {})
     for name in LOADS:
-        values[f"{name}_alpha"], spreads[f"{name}_alpha"] = _limit(name, alpha, alpha_check)
+        found.limit(name, alpha, alpha_check)
         if q is not None:
-            values[f"{name}_q"], spreads[f"{name}_q"] = _limit(name, q, q_check)
-        lag = f"{name}_alphadot"
-        total = f"{name}_q+{lag}"
+            found.limit(name, q, q_check)
+        found.lag(name, alpha, alpha_check, noise)
+        if q is not None:
+            found.sum(f"{name}_q", f"{name}_alphadot")
+    return found.result(alpha)
+
+
+def derive_lateral(
+    beta: StepResponse,
+    p: StepResponse | None = None,
+    r: StepResponse | None = None,
+    *,
+    beta_check: StepResponse | None = None,
+    p_check: StepResponse | None = None,
+    r_check: StepResponse | None = None,
+    noise: float = 1e-4,
+) -> IndicialResult:
+    """Lateral derivatives from a step in beta, and from ones in p and r where given.
+
+    As `derive`, of CY, Cl and Cn: ``C_beta`` and ``C_betadot`` (per ``betadot b/2U``), ``C_p``, ``C_r``.
+    """
+    for kind, one in (("beta", beta), ("p", p), ("r", r)):
+        if one is not None and one.kind != kind:
+            raise InputError("derive_lateral needs a step in beta, and then ones in p and r")
+    found = _Found({}, {}, {}, {})
+    for name in LATERAL_LOADS:
+        found.limit(name, beta, beta_check)
+        for one, check in ((p, p_check), (r, r_check)):
+            if one is not None:
+                found.limit(name, one, check)
+        found.lag(name, beta, beta_check, noise)
+    return found.result(beta)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Values, uncertainties, refusals and integrals as they are found."""
+
+    values: dict[str, float]
+    spreads: dict[str, float | None]
+    refused: dict[str, str]
+    integrals: dict[str, DeficiencyIntegral]
+
+    def limit(self, load: str, one: StepResponse, check: StepResponse | None) -> None:
+        """``C_j`` per unit step."""
+        name = f"{load}_{one.kind}"
+        self.values[name], self.spreads[name] = _limit(load, one, check)
+
+    def lag(self, load: str, one: StepResponse, check: StepResponse | None, noise: float) -> None:
+        """``C_jd`` of the rate of incidence, or why there is none."""
+        name = f"{load}_{one.kind}dot"
         try:
-            integrals[name] = alpha.integral(name, noise=noise)
-            values[lag], spreads[lag] = _lag(name, integrals[name], alpha, alpha_check, noise)
+            self.integrals[load] = one.integral(load, noise=noise)
+            self.values[name], self.spreads[name] = _lag(load, self.integrals[load], one, check, noise)
         except (InputError, NoLimitError) as error:
-            refused[lag] = str(error)
-            if q is not None:
-                refused[total] = f"no {lag}"
-            continue
-        if q is not None:
-            values[total] = values[f"{name}_q"] + values[lag]
-            spreads[total] = _together(spreads[f"{name}_q"], spreads[lag])
-    return IndicialResult(values, spreads, refused, integrals, alpha.amplitude, alpha.condition, alpha.reference)
+            self.refused[name] = str(error)
+
+    def sum(self, rate: str, lag: str) -> None:
+        """Both together, as an oscillation in attitude has them."""
+        name = f"{rate}+{lag}"
+        if lag in self.refused:
+            self.refused[name] = f"no {lag}"
+            return
+        self.values[name] = self.values[rate] + self.values[lag]
+        self.spreads[name] = _together(self.spreads[rate], self.spreads[lag])
+
+    def result(self, one: StepResponse) -> IndicialResult:
+        """With the step's condition and reference."""
+        return IndicialResult(
+            self.values, self.spreads, self.refused, self.integrals, one.amplitude, one.condition, one.reference
+        )
 
 
 def _limit(name: str, one: StepResponse, check: StepResponse | None) -> tuple[float, float | None]:
@@ -341,8 +428,14 @@ def _limit(name: str, one: StepResponse, check: StepResponse | None) -> tuple[fl
 def _lag(
     name: str, integral: DeficiencyIntegral, one: StepResponse, check: StepResponse | None, noise: float
 ) -> tuple[float, float]:
-    """``C_jad`` per alphadot as the reference normalises rates; Eq. (17) gives it per ``alphadot c/2U``."""
+    """``C_jad`` per alphadot as the reference normalises rates; Eq. (17) gives it per ``alphadot c/2U``.
+
+    betadot is made dimensionless by the length of the other lateral rates.
+    """
     scale = 1.0 if one.reference.rate_normalisation == "c/2V" else 0.5
+    if one.kind == "beta":
+        lengths = one.reference.moment_lengths
+        scale *= float(lengths[1] / lengths[2])
     change = 0.0 if check is None else check.integral(name, noise=noise).value - integral.value
     return scale * integral.incidence_rate_derivative, scale * float(np.hypot(integral.uncertainty, change))
 
