@@ -21,6 +21,7 @@ from indicial.flightsim.damping import (
     epicyclic_roots,
     holding_roll,
 )
+from indicial.flightsim.damping_over_k import DampingOverK, damping_over_k
 from indicial.flightsim.damping_sensitivity import ArmSensitivity, DampingSensitivity, damping_sensitivity
 from indicial.flightsim.deficiency import DeficiencyAerodynamics, DeficiencyTerm
 from indicial.flightsim.dynamics import Dynamics, build_dynamics
@@ -32,6 +33,8 @@ from indicial.flightsim.handling_qualities import HandlingQualities, Rating, rat
 from indicial.flightsim.in_flow import LoadFunction, fly_in_flow
 from indicial.flightsim.initial import InitialState
 from indicial.flightsim.linear import LINEAR_OUTPUTS, LinearFlight, linear_flight
+from indicial.flightsim.mode_decay import fitted_eigenvalue
+from indicial.flightsim.mode_sweep import ModeSweep, aircraft_mode_sweep, missile_mode_sweep, sweep_modes
 from indicial.flightsim.modes import LinearModel, Mode, Modes, linearise, missile_modes
 from indicial.flightsim.monte_carlo import Dispersion, MonteCarlo, monte_carlo
 from indicial.flightsim.outputs import OUTPUTS
@@ -69,6 +72,7 @@ __all__ = [
     "CosineGust",
     "DampingChange",
     "DampingCheck",
+    "DampingOverK",
     "DampingSensitivity",
     "DeficiencyAerodynamics",
     "DeficiencyTerm",
@@ -89,6 +93,7 @@ __all__ = [
     "LinearModel",
     "LoadFunction",
     "Mode",
+    "ModeSweep",
     "Modes",
     "MonteCarlo",
     "Motor",
@@ -110,26 +115,31 @@ __all__ = [
     "WindProfile",
     "Winds",
     "air_at",
+    "aircraft_mode_sweep",
     "aircraft_modes",
     "axisymmetric_inertia",
     "basic_finner_range_model",
     "build_dynamics",
     "check_damping",
     "compare",
+    "damping_over_k",
     "damping_sensitivity",
     "epicyclic_roots",
     "fit_epicycle",
     "fit_trajectory",
+    "fitted_eigenvalue",
     "fly",
     "fly_in_flow",
     "holding_roll",
     "linear_flight",
     "linearise",
+    "missile_mode_sweep",
     "missile_modes",
     "monte_carlo",
     "rate_modes",
     "simulate",
     "spin_stability",
+    "sweep_modes",
     "table",
     "trim",
 ]

@@ -16,6 +16,8 @@ from indicial.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from indicial.flightsim.modes import Modes
+
 CLASSES = ("I", "II", "II-L", "II-C", "III", "IV")
 CATEGORIES = ("A", "B", "C")
 
@@ -93,6 +95,7 @@ class HandlingQualities:
 def rate_modes(
     aircraft_class: str,
     category: str,
+    modes: Modes | None = None,
     *,
     short_period: complex | None = None,
     n_alpha: float | None = None,
@@ -107,6 +110,9 @@ def rate_modes(
     ----------
     aircraft_class, category : str
         One of `CLASSES`, `CATEGORIES`.
+    modes : Modes, optional
+        Of `aircraft_modes`: those of their names that are there are rated, but for the ones given below. Coupled modes
+        ("roll-spiral") have other names, and no requirement here.
     short_period, phugoid, dutch_roll : complex, optional
         One of each pair.
     n_alpha : float, optional
@@ -123,6 +129,13 @@ def rate_modes(
         raise InputError(f"aircraft class {aircraft_class!r} is none of {', '.join(CLASSES)}")
     if category not in CATEGORIES:
         raise InputError(f"flight phase category {category!r} is none of {', '.join(CATEGORIES)}")
+    if modes is not None:
+        own = {mode.name: mode.eigenvalue for mode in modes.modes}
+        short_period = own.get("short period") if short_period is None else short_period
+        phugoid = own.get("phugoid") if phugoid is None else phugoid
+        dutch_roll = own.get("Dutch roll") if dutch_roll is None else dutch_roll
+        roll = own["roll"].real if roll is None and "roll" in own else roll
+        spiral = own["spiral"].real if spiral is None and "spiral" in own else spiral
     for name, value in (("short_period", short_period), ("phugoid", phugoid), ("dutch_roll", dutch_roll)):
         if value is not None and not (math.isfinite(abs(value)) and abs(value) > 0.0):
             raise InputError(f"{name} is {value} 1/s, must be finite and not 0")

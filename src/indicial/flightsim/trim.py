@@ -317,6 +317,8 @@ def _inside(low: Array, high: Array) -> tuple[Array, Array]:
 
 
 def _check_determined(names: tuple[str, ...], jacobian: Array, unknowns: Mapping[str, Unknown]) -> None:
+    if not names:
+        return
     scale = np.linalg.norm(jacobian, axis=0)
     if np.any(scale == 0.0):
         raise InputError(f"{names[int(np.argmin(scale))]} has no effect on the equations of this trim: give it instead")

@@ -1,0 +1,184 @@
+"""Modes over Mach number and altitude, and damping over reduced frequency with memory."""
+
+import math
+
+import numpy as np
+import pytest
+
+from flightsim.support import DENSITY, FINNER, SPEED, derivative_model, first_order_lag
+from flightsim.test_aircraft import SPEED as CRUISE
+from flightsim.test_aircraft import boeing_747
+from flightsim.test_linear import level
+from indicial.errors import InputError
+from indicial.flightsim import (
+    MACH,
+    Mode,
+    Modes,
+    StandardAtmosphere,
+    air_at,
+    aircraft_mode_sweep,
+    aircraft_modes,
+    damping_over_k,
+    epicyclic_roots,
+    fitted_eigenvalue,
+    linear_flight,
+    missile_mode_sweep,
+    rate_modes,
+    sweep_modes,
+    table,
+    trim,
+)
+
+
+def crossing(mach: float, altitude: float) -> Modes:
+    """Two modes whose frequencies cross at Mach 1.5, each with a shape of its own, named by their frequency."""
+    del altitude
+    shapes = ({"alpha": 1.0 + 0j, "theta": 0.1j}, {"beta": 1.0 + 0j, "phi": 0.3j})
+    values = (complex(-0.1, 1.0 + mach), complex(-0.2, 4.0 - mach))
+    ordered = sorted(zip(values, shapes, strict=True), key=lambda pair: pair[0].imag)
+    modes = [Mode(name, value, 100.0, shape) for name, (value, shape) in zip(("low", "high"), ordered, strict=True)]
+    return Modes(tuple(modes), 100.0, 0.0)
+
+
+def test_modes_that_cross_keep_their_names() -> None:
+    machs = np.linspace(1.0, 2.0, 11)
+    sweep = sweep_modes(crossing, machs)
+    assert sweep.names == ("low", "high")
+    np.testing.assert_allclose(sweep["low"][0], -0.1 + 1j * (1.0 + machs))
+    np.testing.assert_allclose(sweep["high"][0], -0.2 + 1j * (4.0 - machs))
+
+
+def test_a_pair_that_parts_into_two_real_modes_ends_and_two_begin() -> None:
+    def modes_at(mach: float, altitude: float) -> Modes:
+        del altitude
+        if mach < 1.5:
+            found = [Mode("short period", -1.0 + 1j * (1.5 - mach), 1.0, {"alpha": 1.0 + 0j})]
+        else:
+            found = [Mode(f"short period {i}", complex(-i), 1.0, {"alpha": 1.0 + 0j}) for i in (1, 2)]
+        return Modes(tuple(found), 1.0, 0.0)
+
+    sweep = sweep_modes(modes_at, [1.0, 1.4, 1.6, 2.0])
+    assert sweep.names == ("short period", "short period 1", "short period 2")
+    assert np.isnan(sweep["short period"][0, 2:]).all()
+    np.testing.assert_allclose(sweep["short period 2"][0, 2:], -2.0)
+
+
+def test_a_missile_s_arms_over_mach_and_altitude_are_those_of_the_closed_form() -> None:
+    model = derivative_model(Cm_alpha=table(MACH, [1.5, 3.0], [-40.0, -16.0]), CN_q=0.0, CN_alphadot=0.0)
+    machs, altitudes = [1.5, 2.25, 3.0], [0.0, 5000.0]
+    sweep = missile_mode_sweep(FINNER, model, machs, altitudes, roll_rate=50.0)
+    for i, height in enumerate(altitudes):
+        air = air_at(StandardAtmosphere(), height)
+        for j, (mach, slope) in enumerate(zip(machs, (-40.0, -28.0, -16.0), strict=True)):
+            speed = mach * float(air.speed_of_sound)
+            held = derivative_model(Cm_alpha=slope, CN_q=0.0, CN_alphadot=0.0)
+            fast, _ = epicyclic_roots(FINNER, held, float(air.density), speed, 50.0)
+            found = sweep["fast arm"][i, j]
+            assert found.real == pytest.approx(fast.real * speed, rel=0.01)
+            assert found.imag == pytest.approx(fast.imag * speed, rel=1e-3)
+    assert "fast arm" in sweep.summary()
+    assert len(sweep.plot().axes) == 3
+
+
+def test_an_aircraft_is_trimmed_at_every_point_and_points_without_a_trim_are_told(tmp_path) -> None:
+    steady = level()
+    dynamics = steady.dynamics
+    sound = steady["speed"] / steady["mach"]
+    machs = [steady["speed"] / sound * f for f in (0.02, 1.0, 1.2)]
+    sweep = aircraft_mode_sweep(
+        dynamics,
+        machs,
+        unknown=("alpha", "elevator", "thrust"),
+        given={name: 0.0 for name in dynamics.parameter_names if name not in ("elevator", "thrust")},
+    )
+    modes = aircraft_modes(linear_flight(steady))
+    assert sweep["short period"][0, 1] == pytest.approx(modes["short period"].eigenvalue, rel=1e-9)
+    sweep.to_csv(tmp_path / "modes.csv")
+    rows = (tmp_path / "modes.csv").read_text().splitlines()
+    assert rows[0].startswith("altitude_m,mach,mode")
+    assert len(rows) == 1 + len(machs) * len(sweep.names)
+
+
+def test_no_flight_at_all_is_refused() -> None:
+    def nowhere(mach: float, altitude: float) -> Modes:
+        raise InputError(f"no trim at {mach:g}")
+
+    with pytest.raises(InputError, match=r"no flight at any point: no trim at 0\.5"):
+        sweep_modes(nowhere, [0.5])
+    with pytest.raises(InputError, match="above 0"):
+        sweep_modes(crossing, [0.0])
+
+
+def nonlinear_root(model, inertia: float, guess: complex) -> complex:
+    """Root of det(lambda) [1/m] of e and q/V with H(lambda c/2) of the model in place of derivatives."""
+    a, b, c, d = model.matrices
+    area, length, mass = FINNER.reference.area, FINNER.reference.length, FINNER.mass
+    slowing = DENSITY * area * model.CA_0 / (2.0 * mass)
+    force, moment = DENSITY * area / (2.0 * mass), DENSITY * area * length / (2.0 * inertia)
+
+    def determinant(root: complex) -> complex:
+        s = 0.5 * length * root
+        h = d + c @ np.linalg.solve(s * np.eye(len(a)) - a, b)
+        upper = (root - slowing + force * h[0, 0], -1.0 + force * 0.5 * length * h[0, 1])
+        lower = (-moment * h[1, 0], root - slowing - moment * 0.5 * length * h[1, 1])
+        return upper[0] * lower[1] - upper[1] * lower[0]
+
+    root, step = guess, 1e-6 * guess
+    other = guess + step
+    for _ in range(60):
+        f, g = determinant(root), determinant(other)
+        if f == g:
+            break
+        root, other = other, other - g * (other - root) / (g - f)
+        if abs(root - other) < 1e-14 * abs(root):
+            break
+    return other
+
+
+def test_damping_over_k_solves_the_eigenproblem_with_h_of_s() -> None:
+    model = first_order_lag(0.05)
+    found = damping_over_k(FINNER, model, SPEED, k=[0.002, 0.01, 0.05])
+    for k, value in zip((0.002, 0.01, 0.05), found.lagging, strict=True):
+        inertia = FINNER.inertia[1, 1] * (found.k_here / k) ** 2
+        root = nonlinear_root(model, inertia, value / SPEED * (1.0 + 1e-4))
+        assert value / SPEED == pytest.approx(root, rel=1e-9)
+
+
+def test_memory_does_nothing_at_low_k_and_its_effect_grows_as_the_square() -> None:
+    found = damping_over_k(FINNER, first_order_lag(0.3), SPEED, k=[0.0005, 0.001, 0.002])
+    change = np.abs(found.lagging - found.quasi_steady) / np.abs(found.quasi_steady)
+    assert change[0] < 1e-3
+    assert np.all(np.diff(np.abs(found.ratio_change)) > 0.0)
+    assert found.k == pytest.approx([0.0005, 0.001, 0.002], rel=0.01)
+    assert "differs by more than 1%" in found.summary()
+    assert len(found.plot().axes) == 2
+    with pytest.raises(InputError, match="must be positive"):
+        damping_over_k(FINNER, first_order_lag(0.3), SPEED, k=[0.0])
+
+
+@pytest.mark.parametrize("name", ["short period", "phugoid", "Dutch roll", "roll", "spiral"])
+def test_the_decay_of_a_nonlinear_flight_is_that_of_the_mode(name: str) -> None:
+    steady = trim(boeing_747(), given={"speed": CRUISE}, unknown=())
+    linear = linear_flight(steady)
+    mode = aircraft_modes(linear)[name]
+    far, near = (abs(fitted_eigenvalue(linear, mode, amplitude=size) - mode.eigenvalue) for size in (4e-3, 1e-3))
+    size = abs(mode.eigenvalue)
+    assert near < 2e-3 * size
+    assert near < 0.5 * far or near < 1e-6 * size
+
+
+def test_named_modes_are_rated_as_their_eigenvalues() -> None:
+    steady = trim(boeing_747(), given={"speed": CRUISE}, unknown=())
+    modes = aircraft_modes(linear_flight(steady))
+    rated = rate_modes("III", "B", modes)
+    each = rate_modes(
+        "III",
+        "B",
+        short_period=modes["short period"].eigenvalue,
+        phugoid=modes["phugoid"].eigenvalue,
+        dutch_roll=modes["Dutch roll"].eigenvalue,
+        roll=modes["roll"].damping,
+        spiral=modes["spiral"].damping,
+    )
+    assert rated == each
+    assert math.isfinite(rated.level or math.nan)
