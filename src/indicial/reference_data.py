@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import tomllib
 from dataclasses import dataclass
 from importlib import resources
 from importlib.resources.abc import Traversable
@@ -79,6 +80,28 @@ def find_case(path: str | Path) -> Path:
         return Path(str(packaged))
     known = ", ".join(sorted(item.name for item in cases.iterdir() if item.name.endswith(".toml")))
     raise InputError(f"{path}: no such case file; packaged cases: {known}")
+
+
+_AIRCRAFT_KEYS = {"schema_version", "aircraft_class", "derivatives"}
+
+
+def find_aircraft(path: str | Path) -> Path | None:
+    """An aircraft file: `path` itself if it is one on disk, else the packaged one of that name; None for other things.
+
+    ``data/aircraft/boeing_747.toml``, ``boeing_747.toml`` and ``boeing_747`` all find the packaged one.
+    """
+    given = Path(path)
+    if given.is_file():
+        try:
+            content = tomllib.loads(given.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+        return given if _AIRCRAFT_KEYS & set(content) else None
+    name = given.name if given.suffix == ".toml" else f"{given.name}.toml"
+    packaged = data_folder() / "aircraft" / name
+    if not given.is_dir() and given.parent in (Path(), Path("data/aircraft")) and packaged.is_file():
+        return Path(str(packaged))
+    return None
 
 
 @dataclass(frozen=True)

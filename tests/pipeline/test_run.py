@@ -12,14 +12,18 @@ from indicial.derivatives import DerivativeTable
 from indicial.errors import DivergenceError, InputError
 from indicial.frequency import FrequencyResponse
 from indicial.pipeline import ALL_STAGES, RunFolder, run_stages
+from indicial.pipeline.damping import damping_of_run
 from indicial.reference_data import find_case
 from indicial.rom import StateSpaceModel
 from pipeline.oracle import Oracle, missile
 
 
+def quick_text() -> str:
+    return find_case("basic_finner_quick").read_text(encoding="utf-8").replace("resolution = 1.0", "resolution = 0.5")
+
+
 def quick_case() -> Case:
-    text = find_case("basic_finner_quick").read_text(encoding="utf-8")
-    return parse_case(text.replace("resolution = 1.0", "resolution = 0.5"))
+    return parse_case(quick_text())
 
 
 def make_oracle(case: Case, folder: RunFolder) -> Oracle:
@@ -218,3 +222,20 @@ def test_a_diverging_solver_leaves_what_was_done_and_a_resumable_folder(tmp_path
 def test_all_stages_have_been_run(run):
     assert [name for name in ALL_STAGES if not (run.path / f"{name}.json").is_file()] == []
     assert math.isfinite(run.read("irm")["seconds"])
+
+
+def test_damping_of_a_run_is_that_of_its_flight_and_its_model(run, results):
+    (run.path / "case.toml").write_text(quick_text(), encoding="utf-8")
+    found = damping_of_run(run.path)
+    flown = json.loads((run.path / "fly.json").read_text())["damping"]["derivatives"]["arms"][0]
+    assert found.check.arms[0].linearised.real == pytest.approx(flown["linearised_1_s"], rel=1e-12)
+    assert found.change is not None
+    assert found.over_k is not None
+    rolling = damping_of_run(run.path, roll_rate=30.0)
+    assert rolling.stability.roll_rate == 30.0
+    record = json.loads(json.dumps(rolling.to_dict()))
+    assert record["kind"] == "missile damping"
+    assert record["arms"][0]["parts_1_s"]["Cm_q"] < 0.0
+    assert set(rolling.plot()) == {"flight", "damping_parts", "over_k"}
+    thin = damping_of_run(run.path, altitude=10000.0)
+    assert abs(thin.check.arms[0].linearised.real) < abs(found.check.arms[0].linearised.real)

@@ -10,7 +10,7 @@ import indicial
 from indicial.cli.commands import app
 from indicial.reference_data import find_case
 
-COMMANDS = ("run", "mesh", "derive", "rom", "fly", "identify", "compare", "report", "study")
+COMMANDS = ("run", "mesh", "derive", "rom", "fly", "identify", "compare", "report", "study", "damping")
 
 
 def indicial_command(*arguments: str, cwd=None) -> subprocess.CompletedProcess:
@@ -53,6 +53,11 @@ def test_wrong_input_gives_one_line_and_exit_code_2(tmp_path):
             "magic",
         ): "'magic' is not one of 'mrf', 'fom', 'irm', 'operator', 'all'",
         ("bogus",): "No such command 'bogus'",
+        ("damping", "nothing"): "no such case file",
+        ("damping", "basic_finner_quick"): "not there yet",
+        ("damping", "boeing_747", "--mach", "-1"): "Mach number is -1.0, must be positive",
+        ("damping", "boeing_747", "--roll-rate", "3"): "--roll-rate is for missiles",
+        ("damping", "boeing_747", "--altitude", "1e6"): "altitude must be within",
     }
     for arguments, message in wrong.items():
         done = indicial_command(*arguments, cwd=tmp_path)

@@ -14,9 +14,9 @@ from indicial.case.model import UNITS, Case, Section
 _TYPES = {float: "a number", int: "a whole number", str: "a text", bool: "true or false"}
 
 
-def field_at(location: tuple[str, ...]) -> FieldInfo | None:
+def field_at(location: tuple[str, ...], root: type[BaseModel] = Case) -> FieldInfo | None:
     """The field of a key path such as ``("shape", "fins", "count")``; None if there is none."""
-    model: type[BaseModel] | None = Case
+    model: type[BaseModel] | None = root
     field: FieldInfo | None = None
     for part in location:
         if model is None or part not in model.model_fields:
@@ -26,10 +26,10 @@ def field_at(location: tuple[str, ...]) -> FieldInfo | None:
     return field
 
 
-def known_keys(location: tuple[str, ...]) -> list[str]:
+def known_keys(location: tuple[str, ...], root: type[BaseModel] = Case) -> list[str]:
     """The keys of the table at a key path."""
-    field = field_at(location)
-    return list(Case.model_fields) if field is None else _keys(field)
+    field = field_at(location, root)
+    return list(root.model_fields) if field is None else _keys(field)
 
 
 def allowed(key: str, field: FieldInfo) -> str:
@@ -37,6 +37,10 @@ def allowed(key: str, field: FieldInfo) -> str:
     if _section(field):
         return f"a table [{key}] with {', '.join(_keys(field))}"
     kind, bounds = field.annotation, field.metadata
+    if get_origin(kind) is dict:
+        return (
+            f"a table [{key}] of names and {_value('', *_unpacked(get_args(kind)[1])).replace('a number', 'numbers')}"
+        )
     if get_origin(kind) is list:
         (item,) = get_args(kind)
         return f"a list, each {_value(key, *_unpacked(item))}"
@@ -62,10 +66,11 @@ def _value(key: str, kind: Any, bounds: list[Any]) -> str:
     return " ".join([*words, " and ".join(_bounds(bounds))]).strip()
 
 
-def case_reference() -> str:
-    """Every key of a case file as Markdown tables, made from the models."""
-    parts = ["| key | allowed | default | meaning |\n|---|---|---|---|\n" + _row("title", Case.model_fields["title"])]
-    parts += [_tables(name, field) for name, field in Case.model_fields.items() if name != "title"]
+def case_reference(root: type[BaseModel] = Case) -> str:
+    """Every key of a case file (or of another file's model) as Markdown tables, made from the models."""
+    plain = [_row(name, field) for name, field in root.model_fields.items() if not _section(field)]
+    parts = ["| key | allowed | default | meaning |\n|---|---|---|---|\n" + "\n".join(plain)]
+    parts += [_tables(name, field) for name, field in root.model_fields.items() if _section(field)]
     return "\n\n".join(parts) + "\n"
 
 

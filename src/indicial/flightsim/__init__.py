@@ -10,6 +10,7 @@ from indicial.flightsim.aerodynamics import (
     Validity,
 )
 from indicial.flightsim.aircraft import BodyAxisAerodynamics
+from indicial.flightsim.aircraft_damping import AircraftDamping, ModeDamping, aircraft_damping
 from indicial.flightsim.aircraft_modes import aircraft_modes
 from indicial.flightsim.atmosphere import Air, Atmosphere, ConstantAtmosphere, StandardAtmosphere, air_at
 from indicial.flightsim.comparison import ArmDifference, TrajectoryComparison, compare
@@ -32,7 +33,8 @@ from indicial.flightsim.forces import Force, FunctionForce, Motor
 from indicial.flightsim.handling_qualities import HandlingQualities, Rating, rate_modes
 from indicial.flightsim.in_flow import LoadFunction, fly_in_flow
 from indicial.flightsim.initial import InitialState
-from indicial.flightsim.linear import LINEAR_OUTPUTS, LinearFlight, linear_flight
+from indicial.flightsim.linear import LINEAR_OUTPUTS, LinearFlight, linear_flight, matrix_derivatives
+from indicial.flightsim.missile_damping import MissileDamping, missile_damping
 from indicial.flightsim.mode_decay import fitted_eigenvalue
 from indicial.flightsim.mode_sweep import ModeSweep, aircraft_mode_sweep, missile_mode_sweep, sweep_modes
 from indicial.flightsim.modes import LinearModel, Mode, Modes, linearise, missile_modes
@@ -62,6 +64,7 @@ __all__ = [
     "AerodynamicLoads",
     "Aerodynamics",
     "Air",
+    "AircraftDamping",
     "Arm",
     "ArmDamping",
     "ArmDifference",
@@ -92,7 +95,9 @@ __all__ = [
     "LinearFlight",
     "LinearModel",
     "LoadFunction",
+    "MissileDamping",
     "Mode",
+    "ModeDamping",
     "ModeSweep",
     "Modes",
     "MonteCarlo",
@@ -115,6 +120,7 @@ __all__ = [
     "WindProfile",
     "Winds",
     "air_at",
+    "aircraft_damping",
     "aircraft_mode_sweep",
     "aircraft_modes",
     "axisymmetric_inertia",
@@ -133,6 +139,8 @@ __all__ = [
     "holding_roll",
     "linear_flight",
     "linearise",
+    "matrix_derivatives",
+    "missile_damping",
     "missile_mode_sweep",
     "missile_modes",
     "monte_carlo",

@@ -94,8 +94,12 @@ class DampingOverK:
             f"{self.frequency_change[i]:>+11.2%}"
             for i in chosen
         ]
-        said = ", ".join(f"{share:.0%} from k = {self.k_of_change(share):.3g} on" for share in (0.01, 0.05))
-        return "\n".join([*lines, f"  the damping ratio differs by more than {said}"])
+        said = []
+        for share in (0.01, 0.05):
+            at = self.k_of_change(share)
+            where = f"from k = {at:.3g} on" if at < float("inf") else f"nowhere up to k = {self.k[-1]:.3g}"
+            said.append(f"{share:.0%} {where}")
+        return "\n".join([*lines, f"  the damping ratio differs by more than {', '.join(said)}"])
 
     def plot(self) -> Figure:
         """Damping ratio with both models, and the relative change, over k."""
@@ -119,7 +123,7 @@ def damping_over_k(
     model: StateSpaceAerodynamics,
     speed: float,
     *,
-    k: Sequence[float] = K,
+    k: Sequence[float] | None = None,
     atmosphere: Atmosphere | None = None,
     altitude: float = 0.0,
 ) -> DampingOverK:
@@ -132,7 +136,8 @@ def damping_over_k(
     speed : float
         [m/s].
     k : sequence of float
-        Reduced frequencies ``omega c/2V`` that the pitching motion is to have.
+        Reduced frequencies ``omega c/2V`` that the pitching motion is to have; if not given, `K` as far as it
+        oscillates.
     atmosphere : Atmosphere, optional
         20 C and 1 atm if not given.
     altitude : float
@@ -143,7 +148,7 @@ def damping_over_k(
     InputError
         If k is not positive, or the missile does not oscillate.
     """
-    wanted = np.asarray(k, dtype=float)
+    wanted = np.asarray(K if k is None else k, dtype=float)
     if not wanted.size or not np.all(np.isfinite(wanted)) or not np.all(wanted > 0.0):
         raise InputError("reduced frequencies must be positive and finite")
     air = ConstantAtmosphere() if atmosphere is None else atmosphere
@@ -160,7 +165,10 @@ def damping_over_k(
     bodies = [replace(vehicle, inertia=vehicle.inertia * (here / one) ** 2) for one in wanted]
     quasi_steady = np.array([arm(body, derivatives) for body in bodies])
     lagging = np.array([arm(body, model) for body in bodies])
-    if not np.all(quasi_steady.imag > 0.0):
+    turning = (quasi_steady.imag > 0.0) & (lagging.imag > 0.0)
+    if k is None and np.any(turning):
+        quasi_steady, lagging = quasi_steady[turning], lagging[turning]
+    elif not np.all(turning):
         raise InputError("at the largest k the angles do not oscillate: ask for smaller ones")
     return DampingOverK(np.abs(quasi_steady) * length / (2.0 * speed), quasi_steady, lagging, here, speed)
 

@@ -88,7 +88,7 @@ class HandlingQualities:
     def summary(self) -> str:
         """A line for each requirement."""
         lines = [f"MIL-F-8785C, class {self.aircraft_class}, category {self.category}: {_say(self.level)}"]
-        lines += [f"  {r.what:<22}{_say(r.level):<20}{r.value}  (par. {r.paragraph})" for r in self.ratings]
+        lines += [f"  {r.what:<24}{_say(r.level):<20}{r.value}  (par. {r.paragraph})" for r in self.ratings]
         return "\n".join(lines)
 
 

@@ -163,6 +163,29 @@ def linear_flight(
     return model
 
 
+def matrix_derivatives(linear: LinearFlight, parameters: Iterable[str]) -> Array:
+    """Exact derivatives of `LinearFlight.a` by parameters of the model, shape (n_parameters, n, n).
+
+    The steady flight itself is held: right for what does not act in it, such as derivatives in stability axes.
+    """
+    dynamics, state = linear.trim.dynamics, linear.trim.state
+    names = _checked("parameter", tuple(parameters), dynamics.parameter_names)
+    lift, attitude = _attitude(state)
+    tangent = _tangent(state, linear.states, lift, attitude)
+    x, p = ca.SX.sym("state", state.size), ca.SX.sym("parameters", len(dynamics.parameter_names))
+    jacobian = ca.densify(ca.jacobian(dynamics.derivative(x, p, linear.trim.time), x))
+    columns = [dynamics.parameter_names.index(name) for name in names]
+    slopes = ca.Function("slopes", [x, p], [ca.jacobian(ca.vec(jacobian), p)[:, columns]])
+    values = np.array(slopes(state, linear.trim.parameter_vector))
+    n = state.size
+    return np.array(
+        [
+            _rows(state, linear.states, values[:, j].reshape((n, n), order="F") @ tangent, lift, attitude, None)
+            for j in range(len(names))
+        ]
+    ).reshape(len(names), *linear.a.shape)
+
+
 def _checked(kind: str, names: tuple[str, ...], known: tuple[str, ...]) -> tuple[str, ...]:
     for name in names:
         if name not in known:

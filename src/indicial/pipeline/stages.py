@@ -119,7 +119,7 @@ def run_stages(
         raise InputError(f"no stage {unknown[0]!r}; there are {', '.join(ALL_STAGES)}")
     reporter = LogReporter() if reporter is None else reporter
     count = case.run.workers if workers is None else workers
-    context = Context(case, folder, count, reporter, make_factory or _finite_volume)
+    context = Context(case, folder, count, reporter, make_factory or finite_volume)
     _require(context, stages)
     folder.keep_case()
     due = [s for s in stages if not (resume and folder.is_fresh(s, stage_key(case, s)))]
@@ -193,7 +193,8 @@ def _compiled(reporter: Reporter) -> Outcome:
     return Outcome({}, "kernels are in numba's cache")
 
 
-def _finite_volume(case: Case, folder: RunFolder) -> Any:
+def finite_volume(case: Case, folder: RunFolder) -> Any:
+    """The factory of the finite-volume solver of a run."""
     from indicial.cfd import FlowSettings
     from indicial.pipeline.finite_volume import FiniteVolumeFactory
 
