@@ -51,9 +51,9 @@ def damping_of_run(
     body = vehicle(context)
     derivatives, model = aerodynamics(context)
     air, height = _air(altitude, atmosphere(context))
-    speed = (case.condition.mach if mach is None else mach) * float(air_at(air, height).speed_of_sound)
-    if not speed > 0.0:
-        raise InputError(f"Mach number is {mach}, must be positive")
+    speed = case.flight_condition.speed
+    if mach is not None or altitude is not None:
+        speed = _positive(case.condition.mach if mach is None else mach) * float(air_at(air, height).speed_of_sound)
     known = {r.name: r.uncertainty for r in flown_derivatives(context) if r.uncertainty is not None}
     return missile_damping(
         body,
@@ -89,9 +89,7 @@ def damping_of_aircraft(
     air, height = _air(altitude, own)
     speed = here.speed_m_s
     if mach is not None:
-        if not mach > 0.0:
-            raise InputError(f"Mach number is {mach}, must be positive")
-        speed = mach * float(air_at(air, height).speed_of_sound)
+        speed = _positive(mach) * float(air_at(air, height).speed_of_sound)
     return aircraft_damping(
         file.vehicle,
         file.aerodynamics(speed),
@@ -104,6 +102,12 @@ def damping_of_aircraft(
         gravity=here.gravity_m_s2,
         uncertainties=file.uncertainties,
     )
+
+
+def _positive(mach: float) -> float:
+    if not mach > 0.0:
+        raise InputError(f"Mach number is {mach}, must be positive")
+    return mach
 
 
 def _air(altitude: float | None, own: ConstantAtmosphere) -> tuple[Atmosphere, float]:
