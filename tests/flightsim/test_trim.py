@@ -11,6 +11,7 @@ from flightsim.support import FINNER, first_order_lag
 from indicial.conventions import ReferenceQuantities
 from indicial.errors import InputError
 from indicial.flightsim import (
+    ALPHA,
     BodyAxisAerodynamics,
     ConstantAtmosphere,
     Dynamics,
@@ -138,6 +139,56 @@ def test_spin_of_a_symmetric_body_is_a_helix() -> None:
     assert fall["p"] == pytest.approx(-0.02 / d.Cl_p * 2.0 * speed / reference.length, rel=1e-12)
     assert fall["turn_rate"] == pytest.approx(fall["p"], rel=1e-12)
     assert fall.residual < 1e-10
+
+
+OFFSETS = ("CX_0", "CY_0", "CZ_0", "Cl_0", "Cm_0", "Cn_0")
+SPIN = {"speed": 45.0, "alpha": 0.75, "beta": 0.06, "path_angle": -1.45, "bank": 0.35, "turn_rate": 2.2}
+
+
+def spinner() -> Dynamics:
+    """Stalled: lift that falls with incidence and a roll that is driven, every load with an offset of its own."""
+    reference = ReferenceQuantities(CHORD, AREA, lateral_length=10.0)
+    vehicle = Vehicle("spinner", MASS, np.diag([1200.0, 1800.0, 2700.0]), reference, (0.0, 0.0, 0.0))
+    offset = {name: ca.SX.sym(name) for name in OFFSETS}
+    offset["CZ_0"] = offset["CZ_0"] - 1.1 * ca.sin(ALPHA)
+    model = BodyAxisAerodynamics(
+        reference=reference,
+        **offset,
+        CY_beta=-0.5,
+        Cm_alpha=-0.5,
+        Cm_q=-10.0,
+        Cl_beta=-0.1,
+        Cl_p=0.1,
+        Cl_r=0.25,
+        Cn_beta=0.05,
+        Cn_p=-0.05,
+        Cn_r=-0.3,
+    )
+    return build_dynamics(vehicle, model)
+
+
+def test_a_steady_spin_is_found_with_incidence_sideslip_and_bank_and_goes_on() -> None:
+    """Manufactured: offsets that hold a given spin; then the spin, from elsewhere, with those offsets: a helix."""
+    held = trim(spinner(), given=SPIN, unknown=OFFSETS)
+    offsets = {name: held[name] for name in OFFSETS}
+    guess = {name: Unknown(0.9 * value, -3.1 if name == "bank" else -200.0, 200.0) for name, value in SPIN.items()}
+    spin = trim(spinner(), given=offsets, unknown=guess)
+    assert spin.is_steady
+    for name, value in SPIN.items():
+        assert spin[name] == pytest.approx(value, rel=1e-9), name
+    flight = fly(
+        spin.dynamics,
+        InitialState(spin.state[3:6], spin.state[6:10], spin.state[10:13], spin.state[:3]),
+        3.0,
+        method="dop853",
+        step=0.05,
+        tolerance=1e-12,
+        parameters=offsets,
+    )
+    np.testing.assert_allclose(flight.velocity, np.tile(spin.state[3:6], (len(flight), 1)), atol=1e-6 * spin["speed"])
+    radius = spin["speed"] * math.cos(spin["path_angle"]) / spin["turn_rate"]
+    centre = flight.position[0, :2] + radius * np.array([0.0, 1.0])  # heading north, turning right
+    np.testing.assert_allclose(np.linalg.norm(flight.position[:, :2] - centre, axis=1), radius, rtol=1e-5)
 
 
 def test_lag_states_are_settled() -> None:
