@@ -1,14 +1,18 @@
 """Trajectories: files, interpolation, comparison."""
 
+import json
 import math
 from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from flightsim.support import FINNER, SPEED, derivative_model, first_order_lag
+from indicial.cli import app
 from indicial.errors import InputError
+from indicial.files import read_csv
 from indicial.flightsim import (
     End,
     FlatEarth,
@@ -18,6 +22,7 @@ from indicial.flightsim import (
     compare,
     missile_modes,
     simulate,
+    swerve,
 )
 
 START = InitialState.from_path(SPEED, alpha=0.03, beta=0.01, rate=(200.0, 1.0, -2.0), position=(0.0, 0.0, -2.0))
@@ -133,11 +138,56 @@ def test_compared_flights_show_the_modes_difference_of_damping_and_phase() -> No
     assert fast.frequency / speed == pytest.approx(change.imag, rel=1e-3)
     assert fast.phase == pytest.approx(change.imag * 180.0, abs=0.02)
     assert "damping" in found.summary()
+    for k, sign in ((0, 1.0), (1, -1.0)):
+        along = sign * change.imag * found.first.distance
+        np.testing.assert_allclose(found.phase_difference[:, k], along, atol=0.03)
+
+
+def test_swerve_is_what_winds_about_the_path(tmp_path: Path) -> None:
+    """A helix of known radius about a parabola: the helix is left, and the difference of two is their radii's."""
+    x = np.linspace(0.0, 200.0, 801)
+
+    def helix(radius: float) -> Trajectory:
+        start = simulate(FINNER, derivative_model(), START, 0.01, step=1e-3, estimate_error=False)
+        n, turn = x.size, 0.6 * x
+        position = np.stack([x, radius * np.cos(turn) + 1e-3 * x, radius * np.sin(turn) + 2e-4 * x**2], axis=1)
+        values = {name: np.repeat(getattr(start, name)[:1], n, axis=0) for name in ("velocity", "quaternion", "rate")}
+        values |= {name: np.repeat(getattr(start, name)[:1], n, axis=0) for name in ("force", "moment", "lag")}
+        air = {name: np.full(n, getattr(start, name)[0]) for name in ("density", "speed_of_sound")}
+        return Trajectory(
+            time=x / 600.0, position=position, **values, **air, outside_range=np.zeros(n), reference=start.reference
+        )
+
+    winding = swerve(helix(0.01))
+    assert np.sqrt(np.mean(np.sum(winding**2, axis=1))) == pytest.approx(0.01, rel=0.02)
+    np.testing.assert_allclose(np.linalg.norm(winding[80:-80], axis=1), 0.01, rtol=0.05)
+    found = compare(helix(0.01), helix(0.03), aligned="station", arms=False)
+    np.testing.assert_allclose(found.swerve_difference, 2.0 * winding, atol=1e-12)
+    assert np.all(np.isnan(found.phase_difference))
+    found.to_csv(tmp_path / "differences.csv")
+    header, columns = read_csv(tmp_path / "differences.csv")
+    assert header["schema_version"] == "1"
+    np.testing.assert_allclose(columns["dy_m"], found.position_difference[:, 1])
+    assert found.to_dict()["rms_swerve_m"] == pytest.approx(0.02, rel=0.1)
+
+
+def test_the_command_compares_two_files(flight: Trajectory, tmp_path: Path) -> None:
+    flight.save(tmp_path / "one.nc")
+    flight.save(tmp_path / "other.csv")
+    arguments = ["flights", str(tmp_path / "one.nc"), str(tmp_path / "other.csv"), "--align", "station"]
+    done = CliRunner().invoke(
+        app,
+        [*arguments, "--json", str(tmp_path / "f.json"), "--csv", str(tmp_path / "f.csv"), "--figures", str(tmp_path)],
+    )
+    assert done.exit_code == 0, done.output
+    assert json.loads((tmp_path / "f.json").read_text())["rms_position_m"] == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+    assert (tmp_path / "path_first.png").is_file()
 
 
 def test_pictures_are_drawn(flight: Trajectory) -> None:
     import matplotlib.pyplot as plt
 
     assert len(flight.plot().axes) == 4
-    assert len(compare(flight, flight, arms=False).plot().axes) == 3
+    assert len(compare(flight, flight, arms=False).plot().axes) == 5
+    assert len(flight.plot_path().axes) == 1
     plt.close("all")

@@ -10,7 +10,7 @@ import indicial
 from indicial.cli.commands import app
 from indicial.reference_data import find_case
 
-COMMANDS = ("run", "mesh", "derive", "rom", "fly", "identify", "compare", "report", "study", "damping")
+COMMANDS = ("run", "mesh", "derive", "rom", "fly", "identify", "compare", "report", "study", "damping", "flights")
 
 
 def indicial_command(*arguments: str, cwd=None) -> subprocess.CompletedProcess:

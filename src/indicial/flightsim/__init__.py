@@ -13,7 +13,7 @@ from indicial.flightsim.aircraft import BodyAxisAerodynamics
 from indicial.flightsim.aircraft_damping import AircraftDamping, ModeDamping, aircraft_damping
 from indicial.flightsim.aircraft_modes import aircraft_modes
 from indicial.flightsim.atmosphere import Air, Atmosphere, ConstantAtmosphere, StandardAtmosphere, air_at
-from indicial.flightsim.comparison import ArmDifference, TrajectoryComparison, compare
+from indicial.flightsim.comparison import ArmDifference, TrajectoryComparison, compare, swerve
 from indicial.flightsim.damping import (
     ArmDamping,
     DampingChange,
@@ -148,6 +148,7 @@ __all__ = [
     "simulate",
     "spin_stability",
     "sweep_modes",
+    "swerve",
     "table",
     "trim",
 ]

@@ -14,6 +14,7 @@ from indicial.conventions import Array, ReferenceQuantities, flow_angles
 from indicial.errors import InputError
 from indicial.flightsim.attitude import euler_angles, matrix_from_quaternion
 from indicial.flightsim.trajectory_files import COLUMNS, dataset, load, save
+from indicial.flightsim.trajectory_path import plot_path
 
 if TYPE_CHECKING:
     import xarray
@@ -258,6 +259,10 @@ class Trajectory:
             when = self.time[np.argmax(self.outside_range)]
             lines.append(f"  OUTSIDE the models' stated range at {outside} instants, first at t = {when:.6g} s")
         return "\n".join(lines)
+
+    def plot_path(self, bodies: int = 12) -> Figure:
+        """The path in space, its shadow on the ground, and the body's axes at `bodies` instants."""
+        return plot_path(self, bodies)
 
     def plot(self) -> Figure:
         """Angles against distance, alpha-beta motion in non-rolling axes, Mach number and swerve."""
