@@ -12,6 +12,7 @@ import importlib.util
 import math
 import time
 
+import filters
 from figures import Figure, best_time
 from peers import longitudinal, range_shots
 
@@ -22,7 +23,11 @@ def measure() -> list[Figure]:
     """The fit, then the peer's."""
     record = longitudinal.record(seed=1, memory=0.0)
     ours = best_time(lambda: longitudinal.fit(record, start_known=True, factor=FAR))
-    figures = [_range_shots(), Figure("output error, 500 samples and 4 parameters", 1e3 * ours, "ms")]
+    figures = [
+        *filters.measure(),
+        _range_shots(),
+        Figure("output error, 500 samples and 4 parameters", 1e3 * ours, "ms"),
+    ]
     if importlib.util.find_spec("aeroid") is None:
         return [*figures, Figure("aeroid is not installed: not compared", math.nan, "")]
     start = time.perf_counter()

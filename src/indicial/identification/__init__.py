@@ -1,11 +1,15 @@
-"""Derivatives from flight: what a range measures, linear theory, output error, and how well they are determined."""
+"""Derivatives from flight: range measurements, linear theory, output error, filters; and how well they are determined."""
 
 from indicial.identification.accuracy import Accuracy, Whiteness
 from indicial.identification.coefficients import aerodynamic_coefficient, polynomial_terms, regressor
 from indicial.identification.differentiation import differentiate
 from indicial.identification.equation_error import EquationError, equation_error
 from indicial.identification.estimate import Estimate
+from indicial.identification.filter_error import filter_error
+from indicial.identification.filter_error_fit import FilterErrorFit
+from indicial.identification.filtering import Consistency, FilterResult, filter_record
 from indicial.identification.fit import OutputErrorFit, Verdict
+from indicial.identification.flight_state_model import flight_model, flight_start
 from indicial.identification.instruments import Installation, Sensor, measure_flight
 from indicial.identification.lag_support import LagSupport, lag_support
 from indicial.identification.linear_theory import LinearTheory, linear_theory
@@ -18,13 +22,17 @@ from indicial.identification.reading import read_flight_record
 from indicial.identification.record import CHANNEL_UNITS, FlightRecord
 from indicial.identification.result import IdentificationResult
 from indicial.identification.sensitivity import SensitivityModel
+from indicial.identification.state_model import Process, StateModel, state_model
 
 __all__ = [
     "CHANNEL_UNITS",
     "FREE_FLIGHT",
     "Accuracy",
+    "Consistency",
     "EquationError",
     "Estimate",
+    "FilterErrorFit",
+    "FilterResult",
     "FlightRecord",
     "IdentificationResult",
     "Installation",
@@ -35,9 +43,11 @@ __all__ = [
     "OutputModel",
     "Parameter",
     "Precision",
+    "Process",
     "RangeRecord",
     "SensitivityModel",
     "Sensor",
+    "StateModel",
     "Verdict",
     "Whiteness",
     "aerodynamic_coefficient",
@@ -45,7 +55,11 @@ __all__ = [
     "differentiate",
     "equation_error",
     "estimate",
+    "filter_error",
+    "filter_record",
     "fit_manoeuvres",
+    "flight_model",
+    "flight_start",
     "identify",
     "lag_support",
     "linear_theory",
@@ -56,5 +70,6 @@ __all__ = [
     "reduce_linearly",
     "regressor",
     "start_values",
+    "state_model",
     "substeps_needed",
 ]
