@@ -1,4 +1,4 @@
-"""Derivatives from flight: range measurements, linear theory, output error, filters; and how well they are determined."""
+"""Derivatives from flight: range measurements, linear theory, output and filter error, and how well they are known."""
 
 from indicial.identification.accuracy import Accuracy, Whiteness
 from indicial.identification.coefficients import aerodynamic_coefficient, polynomial_terms, regressor
