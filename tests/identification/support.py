@@ -8,8 +8,8 @@ import numpy as np
 
 from flightsim.support import FINNER, SPEED, derivative_model
 from indicial.conventions import Array
-from indicial.flightsim import DerivativeAerodynamics, End, InitialState, Trajectory, simulate
-from indicial.identification import OutputModel, build_output_model
+from indicial.flightsim import End, InitialState, Trajectory, simulate
+from indicial.identification import RangeModel
 
 MODEL = derivative_model()
 TRUTH = {"CA_0": 0.55, "CN_alpha": 12.0, "Cm_alpha": -28.0, "Cm_q+Cm_alphadot": -360.0, "Cl_p": -22.0}
@@ -32,9 +32,9 @@ def flight() -> Trajectory:
 
 
 @cache
-def output_model(substeps: int = 10, aerodynamics: DerivativeAerodynamics = MODEL) -> OutputModel:
-    """Output model of 54 stations."""
-    return build_output_model(FINNER, aerodynamics, stations=54, substeps=substeps)
+def range_model() -> RangeModel:
+    """Of `MODEL`, with what a free flight determines free."""
+    return RangeModel.of(FINNER, MODEL)
 
 
 def truth(names: tuple[str, ...]) -> Array:

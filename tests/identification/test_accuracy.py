@@ -2,17 +2,7 @@ import numpy as np
 import pytest
 
 from indicial.conventions import Array
-from indicial.identification.accuracy import assess, coloured_covariance, cramer_rao, neighbour_test, undetermined
-
-
-def first_order_noise(rng: np.random.Generator, rho: float, shape: tuple[int, int]) -> Array:
-    """Unit noise, first order along the last axis."""
-    shocks = rng.standard_normal(shape)
-    shocks[:, 1:] *= np.sqrt(1.0 - rho**2)
-    noise = shocks.copy()
-    for i in range(1, shape[1]):
-        noise[:, i] += rho * noise[:, i - 1]
-    return noise
+from indicial.identification.accuracy import cramer_rao, neighbour_test, undetermined
 
 
 def regressors(n: int) -> Array:
@@ -28,12 +18,6 @@ def test_the_bound_is_the_inverse_of_the_information_whatever_the_units():
     np.testing.assert_allclose(cramer_rao(x * units), expected, rtol=1e-9)
 
 
-def test_with_white_noise_the_coloured_covariance_is_the_bound():
-    x = regressors(60)[:, None, :]
-    bound = cramer_rao(x[:, 0])
-    np.testing.assert_allclose(coloured_covariance(x, bound, [0.0]), bound, rtol=1e-10)
-
-
 def test_the_neighbour_test_cries_wolf_as_often_as_it_says():
     n = 54
     x = regressors(n)
@@ -46,27 +30,6 @@ def test_the_neighbour_test_cries_wolf_as_often_as_it_says():
     assert 0.03 < rate < 0.07
     # the correlation that the fit itself makes is taken out
     assert np.mean([result.neighbours for result in results]) == pytest.approx(0.0, abs=0.01)
-
-
-def test_errors_corrected_for_colour_match_the_scatter_where_the_bound_does_not():
-    n, rho, sigma = 400, 0.9, 0.3
-    x = regressors(n)
-    rng = np.random.default_rng(2)
-    noise = sigma * first_order_noise(rng, rho, (200, n))
-    estimates = noise @ x @ np.linalg.inv(x.T @ x)
-    scatter = estimates.std(axis=0)
-    stated, bounds = [], []
-    for row, estimate in zip(noise, estimates, strict=True):
-        residuals = (row - x @ estimate)[:, None]
-        accuracy = assess(
-            ("a", "b", "c", "d"), estimate, 2, ("y",), residuals, x[:, None, :], np.array([residuals.std()])
-        )
-        assert not accuracy.white
-        stated.append(accuracy.standard_errors)
-        bounds.append(np.sqrt(np.diag(accuracy.bound)))
-    # the scatter of 200 numbers is known to 5%
-    np.testing.assert_allclose(np.mean(stated, axis=0), scatter, rtol=0.15)
-    assert np.all(np.mean(bounds, axis=0)[2:] < 0.3 * scatter[2:])
 
 
 def test_derivatives_that_only_act_as_a_sum_are_named_with_their_sum():

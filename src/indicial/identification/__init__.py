@@ -1,6 +1,6 @@
 """Derivatives from flight: range measurements, linear theory, output and filter error, and how well they are known."""
 
-from indicial.identification.accuracy import Accuracy, Whiteness
+from indicial.identification.accuracy import Whiteness
 from indicial.identification.coefficients import aerodynamic_coefficient, polynomial_terms, regressor
 from indicial.identification.differentiation import differentiate
 from indicial.identification.equation_error import EquationError, equation_error
@@ -15,35 +15,32 @@ from indicial.identification.lag_support import LagSupport, lag_support
 from indicial.identification.linear_theory import LinearTheory, linear_theory
 from indicial.identification.maximum_likelihood import fit_manoeuvres
 from indicial.identification.measurement import Precision, RangeRecord, measure
-from indicial.identification.output_error import estimate, identify, reduce_linearly, start_values
-from indicial.identification.output_model import FREE_FLIGHT, OutputModel, build_output_model, substeps_needed
 from indicial.identification.problem import Manoeuvre, Parameter
+from indicial.identification.range_fit import FREE_FLIGHT, RangeFit, RangeModel, identify, reduce_linearly
 from indicial.identification.reading import read_flight_record
 from indicial.identification.record import CHANNEL_UNITS, FlightRecord
-from indicial.identification.result import IdentificationResult
 from indicial.identification.sensitivity import SensitivityModel
 from indicial.identification.state_model import Process, StateModel, state_model
 
 __all__ = [
     "CHANNEL_UNITS",
     "FREE_FLIGHT",
-    "Accuracy",
     "Consistency",
     "EquationError",
     "Estimate",
     "FilterErrorFit",
     "FilterResult",
     "FlightRecord",
-    "IdentificationResult",
     "Installation",
     "LagSupport",
     "LinearTheory",
     "Manoeuvre",
     "OutputErrorFit",
-    "OutputModel",
     "Parameter",
     "Precision",
     "Process",
+    "RangeFit",
+    "RangeModel",
     "RangeRecord",
     "SensitivityModel",
     "Sensor",
@@ -51,10 +48,8 @@ __all__ = [
     "Verdict",
     "Whiteness",
     "aerodynamic_coefficient",
-    "build_output_model",
     "differentiate",
     "equation_error",
-    "estimate",
     "filter_error",
     "filter_record",
     "fit_manoeuvres",
@@ -69,7 +64,5 @@ __all__ = [
     "read_flight_record",
     "reduce_linearly",
     "regressor",
-    "start_values",
     "state_model",
-    "substeps_needed",
 ]

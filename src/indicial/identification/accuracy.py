@@ -3,13 +3,10 @@ r"""How well a record determines what was estimated from it.
 With residuals v_i of station i, sensitivities S_i and noise covariance R (diagonal: channels are independent), the
 Fisher information is ``F = sum S_i^T R^-1 S_i``, and its inverse D the Cramer-Rao bound for white noise.
 
-Coloured noise carries less information than F says. With its covariance Omega along the record, first order in each
-channel (``rho^|i-j|``, rho the correlation of neighbours), the covariance of the same estimate is
+Coloured residuals are made white first (`coloured`).
 
-    D (S^T R^-1 Omega R^-1 S) D.
-
-Klein & Morelli, "Aircraft System Identification" (2006), sec. 6.1.3 (bound) and 8.4 (coloured residuals, there with
-sampled autocorrelations); Belsley, Kuh & Welsch, "Regression Diagnostics" (1980), ch. 3 (condition indices).
+Klein & Morelli, "Aircraft System Identification" (2006), sec. 6.1.3; Belsley, Kuh & Welsch, "Regression Diagnostics"
+(1980), ch. 3 (condition indices).
 """
 
 from __future__ import annotations
@@ -47,124 +44,12 @@ class Whiteness:
     probability: float
 
 
-@dataclass(frozen=True)
-class Accuracy:
-    """Covariance of an estimate and what limits it.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Unknowns.
-    covariance : ndarray
-        Of the unknowns: the Cramer-Rao bound if the residuals pass as white, else corrected for their colour,
-        shape (n, n).
-    bound : ndarray
-        The Cramer-Rao bound, shape (n, n).
-    whiteness : tuple of Whiteness
-        One a channel.
-    white : bool
-        Whether the residuals pass as white.
-    findings : tuple of str
-        What the record cannot tell, in words; empty if it tells all.
-    """
-
-    names: tuple[str, ...]
-    covariance: Array
-    bound: Array
-    whiteness: tuple[Whiteness, ...]
-    white: bool
-    findings: tuple[str, ...]
-
-    @property
-    def standard_errors(self) -> Array:
-        """Standard errors of the unknowns, shape (n,)."""
-        errors: Array = np.sqrt(np.diag(self.covariance))
-        return errors
-
-    @property
-    def correlation(self) -> Array:
-        """Correlations of the unknowns, shape (n, n)."""
-        matrix: Array = self.covariance / np.outer(self.standard_errors, self.standard_errors)
-        return matrix
-
-    def summary(self) -> str:
-        """Whiteness and findings."""
-        lines = []
-        if self.white:
-            lines.append("residuals pass as white: standard errors are the Cramer-Rao bound")
-        else:
-            loud = min(self.whiteness, key=lambda w: w.probability)
-            lines.append(
-                f"residuals are coloured (most in {loud.channel}: neighbours correlate by {loud.neighbours:.2f}): "
-                "standard errors are corrected for it"
-            )
-        return "\n".join([*lines, *self.findings])
-
-
-def assess(
-    names: tuple[str, ...],
-    values: Array,
-    derivatives: int,
-    channels: tuple[str, ...],
-    residuals: Array,
-    sensitivities: Array,
-    noise: Array,
-) -> Accuracy:
-    """Accuracy of an estimate.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Unknowns, derivatives first.
-    values : ndarray
-        Of the unknowns, shape (n,).
-    derivatives : int
-        How many of them are derivatives.
-    channels : tuple of str
-    residuals : ndarray
-        Shape (n_stations, n_channels).
-    sensitivities : ndarray
-        Shape (n_stations, n_channels, n).
-    noise : ndarray
-        Standard deviation of each channel, shape (n_channels,).
-    """
-    whitened = sensitivities / noise[:, None]
-    bound = cramer_rao(whitened.reshape(-1, len(names)))
-    whiteness = tuple(neighbour_test(name, residuals[:, i], whitened[:, i], bound) for i, name in enumerate(channels))
-    white = all(w.probability > WHITE_LEVEL / len(channels) for w in whiteness)
-    covariance = bound if white else coloured_covariance(whitened, bound, [w.neighbours for w in whiteness])
-    findings = undetermined(names[:derivatives], values[:derivatives], covariance[:derivatives, :derivatives])
-    return Accuracy(names, covariance, bound, whiteness, white, findings)
-
-
 def cramer_rao(whitened: Array) -> Array:
     """``(S^T R^-1 S)^-1`` from whitened sensitivities (n_data, n), by singular values, shape (n, n)."""
     size = np.linalg.norm(whitened, axis=0)
     _, singular, rows = np.linalg.svd(whitened / size, full_matrices=False)
     half = rows.T / np.maximum(singular, np.finfo(float).eps * singular[0]) / size[:, None]
     covariance: Array = half @ half.T
-    return covariance
-
-
-def coloured_covariance(whitened: Array, bound: Array, neighbours: list[float]) -> Array:
-    """Covariance of the estimate if each channel's noise is first order with correlation rho of neighbours, (n, n).
-
-    Parameters
-    ----------
-    whitened : ndarray
-        Sensitivities over noise, shape (n_stations, n_channels, n).
-    bound : ndarray
-        Cramer-Rao bound, shape (n, n).
-    neighbours : list of float
-        rho of each channel.
-    """
-    stations = np.arange(whitened.shape[0])
-    apart = np.abs(stations[:, None] - stations[None, :])
-    middle = np.zeros_like(bound)
-    for channel, rho in enumerate(neighbours):
-        slope = whitened[:, channel]
-        middle += slope.T @ np.power(rho, apart) @ slope
-    covariance: Array = bound @ middle @ bound
     return covariance
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from indicial.derivatives import DerivativeTable
 from indicial.files import write_text
-from indicial.identification import FREE_FLIGHT, IdentificationResult, Precision, RangeRecord, identify, measure
+from indicial.identification import FREE_FLIGHT, Precision, RangeFit, RangeRecord, identify, measure
 from indicial.pipeline.context import Context, Outcome
 from indicial.pipeline.flying import atmosphere, load_flights, vehicle
 
@@ -31,15 +31,15 @@ def identify_flight(context: Context) -> Outcome:
     context.reporter.update(0.2, "output error")
     free = (*FREE_FLIGHT, *(("Cl_p",) if rolls else ()))
     result = identify(record, vehicle(context), free=free, atmosphere=atmosphere(context))
-    result.fitted.save(folder.histories / "identified_flight.nc")
+    result.fitted[0].save(folder.histories / "identified_flight.nc")
     table = result.table(context.case.flight_condition)
     write_text(folder.path / "identification.txt", result.summary() + "\n")
     results = {
         "derivatives": table.to_records(),
         "stations": len(record),
-        "iterations": result.iterations,
+        "iterations": len(result.fit.cost),
         "noise": dict(zip(record.channels, result.noise.tolist(), strict=True)),
-        "residuals": {name: result.residuals[:, i].tolist() for i, name in enumerate(record.channels)},
+        "residuals": {name: result.fit.residuals[0][:, i].tolist() for i, name in enumerate(record.channels)},
         "against_flown": _against_flown(context, result),
         "summary": result.summary(),
     }
@@ -52,7 +52,7 @@ def load_record(context: Context) -> RangeRecord:
     return RangeRecord.from_netcdf(context.folder.histories / "range_record.nc")
 
 
-def _against_flown(context: Context, result: IdentificationResult) -> list[dict[str, Any]]:
+def _against_flown(context: Context, result: RangeFit) -> list[dict[str, Any]]:
     """Each identified value beside what the flight was flown with."""
     flown = {r.name: r.value for r in DerivativeTable.from_records(context.folder.read("fly")["flown"])}
     flown["Cm_q+Cm_alphadot"] = flown["Cm_q"] + flown["Cm_alphadot"]
