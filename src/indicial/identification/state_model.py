@@ -37,14 +37,21 @@ class Process:
         is ``intensity sqrt(time_constant/2)``. 0 with no time constant is an unknown constant.
     time_constant : float
         [s]; infinite (the default) makes it a random walk.
+    follows : str, optional
+        Another process, which it lags behind: ``db/dt = (that - b)/time_constant + w``. A vertical gust of Dryden's
+        spectrum is ``sqrt(3) a + (1 - sqrt(3)) b`` with b following a, both of time constant ``T = L_w/V``, and a of
+        intensity ``sigma_w/sqrt(T)``; a horizontal one is a process by itself, of intensity ``sigma_u sqrt(2/T)``.
     """
 
     intensity: float = 0.0
     time_constant: float = math.inf
+    follows: str | None = None
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.intensity) and self.intensity >= 0.0 and self.time_constant > 0.0):
             raise InputError("a process needs a finite intensity of 0 or more and a positive time constant")
+        if self.follows is not None and not math.isfinite(self.time_constant):
+            raise InputError(f"a process that follows {self.follows} needs a finite time constant")
 
 
 @dataclass(frozen=True)
@@ -132,7 +139,11 @@ def state_model(
         raise InputError("a model needs a channel at least, and substeps of 1 or more")
     state = ca.vertcat(*(known[name] for name in names))
     given = ca.vertcat(ca.SX(0, 1), *(symbol for name, symbol in known.items() if name not in names))
-    drift = [-known[name] / p.time_constant for name, p in processes.items()]
+    check_names("process to follow", [p.follows for p in processes.values() if p.follows is not None], processes)
+    drift = [
+        ((0.0 if p.follows is None else known[p.follows]) - known[name]) / p.time_constant
+        for name, p in processes.items()
+    ]
     rate = ca.Function("rate", [state, given, TIME], [ca.densify(ca.vertcat(*rates.values(), *drift))])
     seen = ca.densify(ca.vertcat(*outputs.values()))
     noise = [intensity.get(name, 0.0) for name in rates] + [p.intensity for p in processes.values()]
