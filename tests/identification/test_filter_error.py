@@ -158,8 +158,8 @@ def coverage(found_of, names, runs, truth):
 
 
 def test_in_turbulence_intervals_of_filter_error_hold_and_those_of_output_error_do_not():
-    """60 records of a short period; binomial bounds at 0.1% a parameter."""
-    runs = 60
+    """40 records of a short period; binomial bounds at 0.1% a parameter."""
+    runs = 40
     low = binom.ppf(0.001, runs, 0.95)
     held, _ = coverage(lambda seed: fit(simulated(seed, n=300)[0]), list(TRUE), runs, TRUE)
     assert np.all(held >= low)
@@ -247,3 +247,11 @@ def test_what_is_wrong_is_told():
         )
     with pytest.raises(InputError, match="something unknown"):
         filter_error(linear_model(), [record], [START], [], estimate_noise=False)
+
+
+@pytest.mark.parametrize("factor", [1.0 / 3.0, 3.0])
+def test_a_start_far_off_leads_to_the_same_estimate(factor):
+    record, _ = simulated(7, n=300)
+    near, far = fit(record), fit(record, factor=factor)
+    for e in near.estimates:
+        assert abs(far[e.name].value - e.value) < 0.01 * e.standard_error
