@@ -96,6 +96,8 @@ def test_missing_samples_are_passed_over_and_two_records_are_one_sum():
         assert abs(found[name].value - true) < 4.0 * found[name].standard_error
     assert "filter error: 2 records, 750 measurements" in found.summary()
     found.plot()
+    near, far = found.against({"damping": A[1, 1]}), found.against({"damping": (A[1, 1] - 10.0, 0.1)})
+    assert [v.verdict for v in (*near, *far)] == ["consistent", "shifted"]
 
 
 @pytest.mark.parametrize("free", [False, True])
@@ -158,13 +160,12 @@ def coverage(found_of, names, runs, truth):
 
 
 def test_in_turbulence_intervals_of_filter_error_hold_and_those_of_output_error_do_not():
-    """40 records of a short period; binomial bounds at 0.1% a parameter."""
-    runs = 40
-    low = binom.ppf(0.001, runs, 0.95)
+    """40 and 15 records of a short period; binomial bounds at 0.1% a parameter."""
+    runs, fewer = 40, 15
     held, _ = coverage(lambda seed: fit(simulated(seed, n=300)[0]), list(TRUE), runs, TRUE)
-    assert np.all(held >= low)
-    plain, _ = coverage(lambda seed: fit(simulated(seed, n=300)[0], intensities=False), list(TRUE), runs, TRUE)
-    assert np.min(plain) < low
+    assert np.all(held >= binom.ppf(0.001, runs, 0.95))
+    plain, _ = coverage(lambda seed: fit(simulated(seed, n=300)[0], intensities=False), list(TRUE), fewer, TRUE)
+    assert np.min(plain) < binom.ppf(0.001, fewer, 0.95)
 
 
 TURBULENCE = {"w": 0.3, "q": 0.02}
@@ -226,6 +227,34 @@ def test_coverage_in_turbulence_over_200_records():
     assert np.all(held >= 0.9 * runs)
     assert np.all(held <= 0.985 * runs)
     np.testing.assert_allclose(ratio, 1.0, atol=0.15)
+
+
+def test_a_parameter_of_each_record_and_a_prior():
+    first, second = simulated(1)[0], simulated(2)[0]
+    own = [Parameter("stiffness", -4.0), Parameter("damping", -1.2, per_record=True), Parameter("power", -3.0)]
+    own[2] = Parameter("power", -2.0, prior=(-2.0, 1e-4))
+    found = filter_error(
+        linear_noise(), [first, second], [START, START], own, start_errors=ERRORS, estimate_noise=False
+    )
+    assert [e.name for e in found.estimates] == ["stiffness", "damping[0]", "damping[1]", "power"]
+    assert abs(found["power"].value + 2.0) < 2e-4
+    assert found["power"].standard_error == pytest.approx(1e-4, rel=1e-3)
+    alone = filter_error(
+        linear_noise(),
+        [first],
+        [START],
+        [own[1]],
+        start_errors=ERRORS,
+        estimate_noise=False,
+        known={"stiffness": found["stiffness"].value, "power": found["power"].value},
+    )
+    assert alone["damping"].value == pytest.approx(
+        found["damping[0]"].value, abs=0.01 * alone["damping"].standard_error
+    )
+
+
+def linear_noise():
+    return short_period(**dict(zip(NAMES, INTENSITY, strict=True)))
 
 
 def test_what_is_wrong_is_told():

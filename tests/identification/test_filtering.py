@@ -243,6 +243,14 @@ def test_divergence_and_a_dead_channel_are_told(method):
         filter_record(wild, record, {"w": 100.0}, {"w": 1e-3}, method=method)
 
 
+def test_a_channel_that_freezes_on_the_way_is_not_consistent():
+    record, _ = simulated(1)
+    q = record["q"].copy()
+    q[120:] = q[120]
+    assert filter_record(linear_model(), record, START, ERRORS).consistency().consistent
+    assert not filter_record(linear_model(), record.with_channels(q=q), START, ERRORS).consistency().consistent
+
+
 def test_variances_stay_positive_where_the_plain_update_loses_them():
     """Noise 1e-9 of what is not known of the start: P - P h h^T P/s would keep nothing but round-off."""
     record, _ = simulated(1)

@@ -12,6 +12,7 @@ from indicial.conventions import Array
 from indicial.errors import InputError
 from indicial.identification.estimate import Estimate
 from indicial.identification.filtering import FilterResult
+from indicial.identification.fit import Verdict, verdicts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -71,6 +72,10 @@ class FilterErrorFit:
         errors = np.sqrt(np.diag(self.covariance))
         matrix: Array = self.covariance / np.outer(errors, errors)
         return matrix
+
+    def against(self, before: Mapping[str, float | tuple[float, float]]) -> tuple[Verdict, ...]:
+        """Estimates against values known before: numbers, or pairs of value and standard deviation."""
+        return verdicts(self, before)
 
     def summary(self) -> str:
         """Estimates with standard errors, what the records cannot tell, and whether innovations are white."""

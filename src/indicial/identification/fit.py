@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
@@ -44,6 +44,28 @@ class Verdict:
     def summary(self) -> str:
         """One line."""
         return f"{self.estimate.summary()}   before {self.before:.5g} +- {self.before_error:.2g}: {self.verdict}"
+
+
+class Found(Protocol):
+    """Estimates by name."""
+
+    def __getitem__(self, name: str) -> Estimate: ...
+
+
+def verdicts(found: Found, before: Mapping[str, float | tuple[float, float]]) -> tuple[Verdict, ...]:
+    """Estimates against values known before: numbers, or pairs of value and standard deviation."""
+    made = []
+    for name, given in before.items():
+        value, error = given if isinstance(given, tuple) else (given, 0.0)
+        estimate = found[name]
+        if estimate.standard_error > _UNSEEN * max(abs(estimate.value), abs(value)):
+            word: Literal["consistent", "shifted", "unidentifiable"] = "unidentifiable"
+        elif abs(estimate.value - value) <= _SURE * math.hypot(estimate.standard_error, error):
+            word = "consistent"
+        else:
+            word = "shifted"
+        made.append(Verdict(estimate, value, error, word))
+    return tuple(made)
 
 
 @dataclass(frozen=True)
@@ -127,18 +149,7 @@ class OutputErrorFit:
 
     def against(self, before: Mapping[str, float | tuple[float, float]]) -> tuple[Verdict, ...]:
         """The parameters against values known before: numbers, or pairs of value and standard deviation."""
-        verdicts = []
-        for name, given in before.items():
-            value, error = given if isinstance(given, tuple) else (given, 0.0)
-            estimate = self[name]
-            if estimate.standard_error > _UNSEEN * max(abs(estimate.value), abs(value)):
-                word: Literal["consistent", "shifted", "unidentifiable"] = "unidentifiable"
-            elif abs(estimate.value - value) <= _SURE * math.hypot(estimate.standard_error, error):
-                word = "consistent"
-            else:
-                word = "shifted"
-            verdicts.append(Verdict(estimate, value, error, word))
-        return tuple(verdicts)
+        return verdicts(self, before)
 
     def summary(self) -> str:
         """Parameters with standard errors, noise, and what the records cannot tell."""
