@@ -12,7 +12,9 @@ from indicial.cli.commands import app
 if TYPE_CHECKING:
     from indicial.studies import Study
 
-Name = Annotated[str, typer.Argument(metavar="STUDY", help="Name of the study: bocian, finner, freeflight or plate.")]
+Name = Annotated[
+    str, typer.Argument(metavar="STUDY", help="Name of the study: bocian, finner, freeflight, plate or range.")
+]
 Compute = Annotated[
     str | None, typer.Option(metavar="PATTERN", help="Compute the missing pieces of these names ('*' for all).")
 ]

@@ -16,6 +16,7 @@ from indicial.identification.linear_theory import LinearTheory, linear_theory
 from indicial.identification.maximum_likelihood import fit_manoeuvres
 from indicial.identification.measurement import Precision, RangeRecord, measure
 from indicial.identification.problem import Manoeuvre, Parameter
+from indicial.identification.range_columns import RangeReduction, reduce_range
 from indicial.identification.range_fit import FREE_FLIGHT, RangeFit, RangeModel, identify, reduce_linearly
 from indicial.identification.reading import read_flight_record
 from indicial.identification.record import CHANNEL_UNITS, FlightRecord
@@ -42,6 +43,7 @@ __all__ = [
     "RangeFit",
     "RangeModel",
     "RangeRecord",
+    "RangeReduction",
     "SensitivityModel",
     "Sensor",
     "StateModel",
@@ -63,6 +65,7 @@ __all__ = [
     "polynomial_terms",
     "read_flight_record",
     "reduce_linearly",
+    "reduce_range",
     "regressor",
     "state_model",
 ]

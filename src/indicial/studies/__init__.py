@@ -19,8 +19,9 @@ def find_study(name: str) -> Study:
     from indicial.studies.finner import STUDY as FINNER
     from indicial.studies.freeflight import STUDY as FREEFLIGHT
     from indicial.studies.plate import STUDY as PLATE
+    from indicial.studies.range import STUDY as RANGE
 
-    known = {study.name: study for study in (BOCIAN, FINNER, FREEFLIGHT, PLATE)}
+    known = {study.name: study for study in (BOCIAN, FINNER, FREEFLIGHT, PLATE, RANGE)}
     if name not in known:
         raise InputError(f"no study {name!r}; there are {', '.join(known)}")
     return known[name]

@@ -1,0 +1,70 @@
+"""The range study: its kept results are complete and its figures hold, and the yaw it flies is the yaw it asks for."""
+
+import math
+
+import numpy as np
+import pytest
+
+from indicial.reference_data import read_table
+from indicial.studies.kept import Results
+from indicial.studies.range import STUDY
+from indicial.studies.range.agreement import closing_arrays, implied_noise
+from indicial.studies.range.computing import published, shot
+from indicial.studies.range.pieces import PIECES, groups
+
+KEPT = Results.kept("range", STUDY.pieces)
+
+
+def test_every_piece_is_kept_and_every_asked_figure_holds() -> None:
+    assert len(KEPT) == len(STUDY.pieces)
+    for claim in STUDY.claims(KEPT):
+        assert claim.holds, claim.summary()
+
+
+def test_groups_have_the_mach_number_and_the_yaw_that_the_report_prints() -> None:
+    """Means over the shots, so that the two shots left out are those the report left out."""
+    table = read_table("basic_finner_range_multifit")
+    printed = dict(zip(table.numbers("mach"), table.numbers("dbsq_mean_deg2"), strict=True))
+    for mach, shots in groups().items():
+        assert np.mean([m for m, _ in shots]) == pytest.approx(mach, abs=2e-3)
+        assert np.mean([yaw for _, yaw in shots]) == pytest.approx(printed[mach], abs=0.3)
+
+
+def test_shots_have_the_yaw_asked_for() -> None:
+    piece = next(piece for piece in PIECES if piece.method == "closing")
+    truth = {name: value for name, (value, _) in published(piece.mach).items()}
+    flown = shot(truth, 1.06, 2.0, 0.7, piece.settings)
+    assert np.mean(np.degrees(flown.total_angle) ** 2) == pytest.approx(2.0, rel=0.02)
+    assert flown.rate[0, 0] == pytest.approx(50.0)
+
+
+def test_records_of_different_groups_share_no_noise() -> None:
+    """Normalised errors of two groups would be alike if they did."""
+    errors, reported = closing_arrays(list(KEPT.select(method="closing")))
+    scaled = (errors / reported).reshape(len(errors), -1)
+    correlation = np.corrcoef(scaled) - np.eye(len(scaled))
+    assert np.max(np.abs(correlation)) < 4.5 / math.sqrt(scaled.shape[1])
+
+
+def test_implied_noise_is_the_assumed_one_times_printed_over_found_error() -> None:
+    closing = list(KEPT.select(method="closing"))
+    noise = implied_noise(closing)
+    result = next(r for r in closing if r.piece.mach == 3.734)
+    value, error = result.provenance["multiple"]["Cm_q+Cm_alphadot"]
+    assert noise[3.734] == pytest.approx(0.1 * 1.0 / (67.449 * error / abs(value)), rel=1e-3)
+
+
+def test_errors_fall_with_yaw_and_stations_as_they_must() -> None:
+    rows = next(iter(KEPT.select(method="implied"))).provenance["rows"]
+    table = {(r["yaw_deg"], r["stations"], r["angle_deg"]): r["pe_pct"] for r in rows}
+    assert table[0.5, 54, 0.1] / table[1.0, 54, 0.1] == pytest.approx(2.0, rel=0.1)
+    assert table[1.0, 20, 0.1] / table[1.0, 100, 0.1] == pytest.approx(math.sqrt(5.0), rel=0.1)
+
+
+def test_a_group_is_recovered_again_as_it_was_kept() -> None:
+    name = STUDY.subsets["coarse"][0]
+    piece = next(piece for piece in PIECES if piece.name == name)
+    again = STUDY.compute(piece, None, None)  # type: ignore[arg-type]
+    kept = KEPT.select(method="closing").at(piece.mach)
+    assert kept is not None
+    np.testing.assert_allclose(again.provenance["errors"], kept.provenance["errors"], rtol=1e-4, atol=1e-6)
