@@ -10,12 +10,16 @@ from indicial.identification.filter_error_fit import FilterErrorFit
 from indicial.identification.filtering import Consistency, FilterResult, filter_record
 from indicial.identification.fit import OutputErrorFit, Verdict
 from indicial.identification.flight_state_model import flight_model, flight_start
+from indicial.identification.input_design import Experiment, Promise, Ranking, improve_input, rank_manoeuvres
 from indicial.identification.instruments import Installation, Sensor, measure_flight
 from indicial.identification.lag_support import LagSupport, lag_support
 from indicial.identification.linear_theory import LinearTheory, linear_theory
 from indicial.identification.maximum_likelihood import fit_manoeuvres
 from indicial.identification.measurement import Precision, RangeRecord, measure
+from indicial.identification.multisine import multisines, relative_peak_factor
+from indicial.identification.parameter_functions import polynomial, spline
 from indicial.identification.problem import Manoeuvre, Parameter
+from indicial.identification.profile_likelihood import Profile, profile_likelihood
 from indicial.identification.range_columns import RangeReduction, reduce_range
 from indicial.identification.range_fit import FREE_FLIGHT, RangeFit, RangeModel, identify, reduce_linearly
 from indicial.identification.reading import read_flight_record
@@ -29,6 +33,7 @@ __all__ = [
     "Consistency",
     "EquationError",
     "Estimate",
+    "Experiment",
     "FilterErrorFit",
     "FilterResult",
     "FlightRecord",
@@ -40,10 +45,13 @@ __all__ = [
     "Parameter",
     "Precision",
     "Process",
+    "Profile",
+    "Promise",
     "RangeFit",
     "RangeModel",
     "RangeRecord",
     "RangeReduction",
+    "Ranking",
     "SensitivityModel",
     "Sensor",
     "StateModel",
@@ -58,14 +66,21 @@ __all__ = [
     "flight_model",
     "flight_start",
     "identify",
+    "improve_input",
     "lag_support",
     "linear_theory",
     "measure",
     "measure_flight",
+    "multisines",
+    "polynomial",
     "polynomial_terms",
+    "profile_likelihood",
+    "rank_manoeuvres",
     "read_flight_record",
     "reduce_linearly",
     "reduce_range",
     "regressor",
+    "relative_peak_factor",
+    "spline",
     "state_model",
 ]

@@ -1,0 +1,218 @@
+r"""Profile likelihoods: intervals where the Cramer-Rao bound is not to be trusted.
+
+With all other unknowns at their best for each value of one, ``D(v) = 2 (J(v) - J_min)`` is chi-squared of one degree of
+freedom at the true value, whatever the unknown is called or scaled, and the interval of level gamma is where D is below
+its quantile. The bound is the parabola of the same curvature at the best fit: it agrees where the model is linear in
+the unknown as far as the interval goes. The noise is that of the fit. Source: Venzon & Moolgavkar, Appl. Stat. 37
+(1988) 87; Raue et al., Bioinformatics 25 (2009) 1923.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from indicial.conventions import Array
+from indicial.errors import DivergenceError, InputError
+from indicial.identification.fit import OutputErrorFit
+from indicial.identification.maximum_likelihood import Noise, Problem, minimise
+from indicial.identification.problem import Manoeuvre, Parameter
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_APART = 0.1  # of the bound's half width: from here on profile and bound are said to differ
+_FARTHEST = 20.0  # standard errors looked at; an interval that reaches farther is open
+_CLOSE = 0.01  # of the square root of D at an end
+_TRIALS = 25
+
+
+@dataclass(frozen=True)
+class Profile:
+    """The profile likelihood of one unknown.
+
+    Parameters
+    ----------
+    name : str
+    estimate, standard_error : float
+        Of the fit.
+    level : float
+        Of the interval.
+    lower, upper : float
+        Its ends; infinite where the likelihood does not fall enough within 20 standard errors, or no fit converges.
+    values, statistic : ndarray
+        Points looked at, and D there, in order, shape (n,).
+    """
+
+    name: str
+    estimate: float
+    standard_error: float
+    level: float
+    lower: float
+    upper: float
+    values: Array
+    statistic: Array
+
+    @property
+    def bound(self) -> tuple[float, float]:
+        """The interval by the Cramer-Rao bound."""
+        half = math.sqrt(_quantile(self.level)) * self.standard_error
+        return self.estimate - half, self.estimate + half
+
+    @property
+    def trusts_bound(self) -> bool:
+        """Whether the bound's interval has the profile's ends, within a tenth of its half width."""
+        half = 0.5 * (self.bound[1] - self.bound[0])
+        ends = zip((self.lower, self.upper), self.bound, strict=True)
+        return all(abs(mine - its) <= _APART * half for mine, its in ends)
+
+    def summary(self) -> str:
+        """The interval, and whether the bound's will do."""
+        low, high = self.bound
+        word = "the bound agrees" if self.trusts_bound else f"NOT the bound's, {low:.5g} to {high:.5g}"
+        return (
+            f"{self.name}: {self.estimate:.5g}, {self.level:.0%} interval {self.lower:.5g} to {self.upper:.5g}; {word}"
+        )
+
+    def plot(self) -> Figure:
+        """D over the unknown, the parabola of the bound, and the level."""
+        import matplotlib.pyplot as plt
+
+        figure, axes = plt.subplots(figsize=(6.4, 4.0), layout="constrained")
+        axes.plot(self.values, self.statistic, "o-", ms=4, label="profile")
+        fine = np.linspace(self.values[0], self.values[-1], 200)
+        axes.plot(fine, ((fine - self.estimate) / self.standard_error) ** 2, "--", label="Cramer-Rao bound")
+        limit = _quantile(self.level)
+        axes.axhline(limit, color="0.5", linewidth=0.8, label=f"{self.level:.0%}")
+        for end in (self.lower, self.upper):
+            if math.isfinite(end):
+                axes.axvline(end, color="C0", linewidth=0.8)
+        axes.set(xlabel=self.name, ylabel="2 (J - least J)", ylim=(0.0, 2.5 * limit))
+        axes.legend(fontsize="small")
+        return figure
+
+
+def profile_likelihood(
+    fit: OutputErrorFit,
+    parameters: Sequence[Parameter],
+    name: str,
+    *,
+    level: float = 0.95,
+    threads: int | None = None,
+) -> Profile:
+    """The profile likelihood of a parameter of a fit.
+
+    Parameters
+    ----------
+    fit : OutputErrorFit
+    parameters : sequence of Parameter
+        Those that `fit_manoeuvres` was given.
+    name : str
+        One that the records have in common.
+    level : float
+    threads : int, optional
+        As `fit_manoeuvres`.
+
+    Raises
+    ------
+    InputError
+        If there is no such parameter, it has a value for each record or a prior, or the level is none.
+    """
+    if not 0.0 < level < 1.0:
+        raise InputError(f"level is {level}, must be between 0 and 1")
+    chosen = next((p for p in parameters if p.name == name), None)
+    if chosen is None:
+        raise InputError(f"no parameter {name!r} to profile; there are {', '.join(p.name for p in parameters)}")
+    if chosen.per_record or chosen.prior is not None:
+        raise InputError(f"{name} has {'a value for each record' if chosen.per_record else 'a prior'}: profile another")
+    best = fit[name]
+    walk = _Walk(fit, [p for p in parameters if p.name != name], chosen, threads)
+    with threadpool_limits(limits=1, user_api="blas"):
+        ends = [walk.end(sign, math.sqrt(_quantile(level)), best.standard_error) for sign in (-1.0, 1.0)]
+    seen = sorted(walk.seen.items())
+    return Profile(
+        name,
+        best.value,
+        best.standard_error,
+        level,
+        ends[0],
+        ends[1],
+        np.array([v for v, _ in seen]),
+        np.array([d for _, d in seen]),
+    )
+
+
+class _Walk:
+    """Fits with one parameter held, from value to value."""
+
+    def __init__(
+        self, fit: OutputErrorFit, others: Sequence[Parameter], chosen: Parameter, threads: int | None
+    ) -> None:
+        self.fit, self.others, self.chosen, self.threads = fit, others, chosen, threads
+        self.noise = Noise(fit.noise, fit.memory)
+        self.start = {e.name: e.value for e in (*fit.parameters, *fit.start_values)}
+        self.centre = self.start[chosen.name]
+        self.least = self._cost(self.centre)
+        self.seen = {self.centre: 0.0}
+
+    def statistic(self, value: float) -> float:
+        """D at a value; infinite where no flight is found."""
+        if value not in self.seen:
+            try:
+                self.seen[value] = max(2.0 * (self._cost(value) - self.least), 0.0)
+            except DivergenceError:
+                return math.inf
+        return self.seen[value]
+
+    def end(self, sign: float, wanted: float, error: float) -> float:
+        """Where the square root of D is `wanted`, on one side: bracketed, then by false position on the root."""
+        inside, outside = 0.0, 1.1 * wanted
+        inner, outer = 0.0, math.sqrt(self.statistic(self.centre + sign * outside * error))
+        while outer < wanted:
+            inside, inner = outside, outer
+            outside *= 1.6
+            if outside > _FARTHEST or (self.chosen.positive and self.centre + sign * outside * error <= 0.0):
+                return sign * math.inf if sign > 0.0 or not self.chosen.positive else 0.0
+            outer = math.sqrt(self.statistic(self.centre + sign * outside * error))
+        for _ in range(_TRIALS):
+            share = (wanted - inner) / (outer - inner) if math.isfinite(outer) else 0.5
+            trial = inside + min(max(share, 0.05), 0.95) * (outside - inside)
+            found = math.sqrt(self.statistic(self.centre + sign * trial * error))
+            if abs(found - wanted) < _CLOSE * wanted:
+                return self.centre + sign * trial * error
+            if found < wanted:
+                inside, inner = trial, found
+            else:
+                outside, outer = trial, found
+        return self.centre + sign * inside * error
+
+    def _cost(self, value: float) -> float:
+        """Least J with the parameter held; begins where the fit ended."""
+        held = [_knowing(m, self.chosen.name, value) for m in self.fit.manoeuvres]
+        problem = Problem(held, self.others, self.threads)
+        problem.start = np.array([self.start.get(n, problem.start[i]) for i, n in enumerate(problem.names)])
+        seams = tuple(np.zeros((0, m.node_states.shape[1])) for m in held)
+        point = problem.look(problem.start, None if not any(len(m.node_states) for m in held) else seams)
+        if point is None:
+            raise DivergenceError("not finite")
+        cost: list[float] = []
+        minimise(problem, point, self.noise, cost)
+        return cost[-1]
+
+
+def _knowing(manoeuvre: Manoeuvre, name: str, value: float) -> Manoeuvre:
+    single = replace(manoeuvre, nodes=manoeuvre.nodes[:0], node_states=manoeuvre.node_states[:0])
+    if name not in manoeuvre.model.parameter_names:
+        return single
+    return replace(single, known={**manoeuvre.known, name: value})
+
+
+def _quantile(level: float) -> float:
+    from scipy.stats import chi2
+
+    return float(chi2.ppf(level, 1))

@@ -1,0 +1,78 @@
+"""Profiles: the bound's parabola where the model is linear, other than it where it is not, and coverage there."""
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from identification.test_lag_support import FREE, TRUTH, compiled, exact, manoeuvre
+from identification.test_lag_support import NOISE as LAG_NOISE
+from identification.test_maximum_likelihood import CHANNELS, START, aircraft, parameters, simulated
+from indicial.errors import InputError
+from indicial.identification import Manoeuvre, Parameter, SensitivityModel, fit_manoeuvres, profile_likelihood
+
+
+def test_of_an_offset_the_profile_is_the_bound_s_parabola():
+    """A bias of theta adds to one channel: with the start of theta known the model is linear in it."""
+    model = SensitivityModel.of(aircraft(), CHANNELS, ["theta"])
+    m = Manoeuvre.of_flight(simulated(5), aircraft(), START, biases=["theta"], model=model)
+    unknown = [*parameters(), Parameter("bias_theta", 0.0)]
+    fit = fit_manoeuvres([m], unknown)
+    found = profile_likelihood(fit, unknown, "bias_theta")
+    assert found.lower == pytest.approx(found.bound[0], abs=0.02 * fit["bias_theta"].standard_error)
+    assert found.upper == pytest.approx(found.bound[1], abs=0.02 * fit["bias_theta"].standard_error)
+    assert found.trusts_bound
+    assert "the bound agrees" in found.summary()
+    assert found.plot().axes[0].get_xlabel() == "bias_theta"
+
+
+def test_of_a_well_determined_derivative_it_is_the_bound_too():
+    from identification.test_maximum_likelihood import manoeuvre as whole
+
+    fit = fit_manoeuvres([whole(simulated(3))], parameters())
+    found = profile_likelihood(fit, parameters(), "Cm_q", level=0.9)
+    assert found.trusts_bound
+    assert np.all(found.statistic >= 0.0)
+
+
+LAG, UNKNOWN = (0.5, -0.15, 0.3), [*(Parameter(n, v) for n, v in TRUTH.items())]
+
+
+def lag_fit(seed):
+    noise = np.random.default_rng(seed).standard_normal(exact(*LAG).shape) * np.array(list(LAG_NOISE.values()))
+    unknown = [*UNKNOWN, Parameter("b", LAG[2], positive=True), Parameter("a_N", LAG[0]), Parameter("a_m", LAG[1])]
+    return fit_manoeuvres([manoeuvre(exact(*LAG) + noise, free_start=FREE)], unknown, threads=1), unknown
+
+
+def test_of_a_lag_hardly_determined_the_profile_is_not_the_bound():
+    """Rate and amplitude trade against each other: the interval is open or lopsided where the bound's is even."""
+    assert compiled().parameter_names
+    fit, unknown = lag_fit(1)
+    found = profile_likelihood(fit, unknown, "b", threads=1)
+    assert not found.trusts_bound
+    assert found.lower < LAG[2] < found.upper
+    assert found.upper - found.estimate > 1.3 * (found.estimate - found.lower)
+
+
+@pytest.mark.slow
+def test_the_profile_covers_where_the_bound_does_not():
+    held, bound = 0, 0
+    count = 60
+    for seed in range(count):
+        fit, unknown = lag_fit(100 + seed)
+        found = profile_likelihood(fit, unknown, "b", threads=1)
+        held += found.lower <= LAG[2] <= found.upper
+        bound += found.bound[0] <= LAG[2] <= found.bound[1]
+    assert binom.cdf(held, count, 0.95) > 0.005, (held, bound)
+
+
+def test_what_cannot_be_profiled_is_refused():
+    from identification.test_maximum_likelihood import manoeuvre as whole
+
+    unknown = [*parameters()[:3], Parameter("Cm_elevator", -1.2, prior=(-1.2, 0.1))]
+    fit = fit_manoeuvres([whole(simulated(3))], unknown)
+    with pytest.raises(InputError, match="no parameter 'Cn_r'"):
+        profile_likelihood(fit, unknown, "Cn_r")
+    with pytest.raises(InputError, match="a prior"):
+        profile_likelihood(fit, unknown, "Cm_elevator")
+    with pytest.raises(InputError, match="level"):
+        profile_likelihood(fit, unknown, "Cm_q", level=1.0)
