@@ -8,14 +8,29 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from flightsim.test_aircraft import DENSITY, GRAVITY, boeing_747
+from flightsim.test_aircraft import DENSITY, GRAVITY, SPEED, boeing_747
 from indicial.case import read_aircraft
 from indicial.cli.commands import app
 from indicial.errors import InputError
-from indicial.flightsim import AircraftDamping, ConstantAtmosphere, aircraft_damping
+from indicial.flightsim import (
+    AircraftDamping,
+    BodyAxisAerodynamics,
+    ConstantAtmosphere,
+    FlatEarth,
+    Mode,
+    Modes,
+    aircraft_damping,
+    build_dynamics,
+    classical_modes,
+    linear_flight,
+    rate_modes,
+    trim,
+)
 from indicial.pipeline.damping import damping_of_aircraft
 from indicial.reference_data import find_aircraft
 
+SOUND = math.sqrt(1.4 * 8314.32 / 28.9644 * 216.65)
+AIR = ConstantAtmosphere(216.65, DENSITY * 8314.32 / 28.9644 * 216.65)
 PUBLISHED = {
     "phugoid": -0.003289 + 0.06723j,
     "short period": -0.3719 + 0.8875j,
@@ -48,8 +63,7 @@ def test_the_file_holds_the_747_of_the_book(boeing: AircraftDamping) -> None:
 def test_gradients_are_those_of_differences(boeing: AircraftDamping) -> None:
     vehicle = boeing.steady.dynamics.vehicle
     model = read_aircraft(str(find_aircraft("boeing_747"))).aerodynamics()
-    air = ConstantAtmosphere(216.65, DENSITY * 8314.32 / 28.9644 * 216.65)
-    options = {"atmosphere": air, "aircraft_class": "III", "category": "B", "gravity": GRAVITY}
+    options = {"atmosphere": AIR, "aircraft_class": "III", "category": "B", "gravity": GRAVITY}
     for derivative in ("Cm_q", "CZ_alphadot", "Cl_beta"):
         value = getattr(model, derivative)
         near = [
@@ -74,9 +88,9 @@ def test_what_the_short_period_s_damping_is_made_of(boeing: AircraftDamping) -> 
     parts = boeing["short period"].parts
     assert set(list(parts)[:3]) == {"Cm_q", "CZ_alpha", "Cm_alphadot"}
     assert sum(parts.values()) == pytest.approx(boeing["short period"].mode.damping, rel=0.02)
-    few = boeing["short period"].few_states
-    assert few is not None
-    assert few == pytest.approx(boeing["short period"].mode.eigenvalue, rel=0.01)
+    closed = boeing["short period"].closed_form
+    assert closed is not None
+    assert closed == pytest.approx(boeing["short period"].mode.eigenvalue, rel=0.01)
 
 
 def test_uncertainty_is_carried_through(boeing: AircraftDamping) -> None:
@@ -102,7 +116,43 @@ def test_another_altitude_and_speed_are_balanced_anew() -> None:
     assert file is not None
     low = damping_of_aircraft(file, mach=0.5, altitude=3000.0)
     assert low.steady.outputs["mach"] == pytest.approx(0.5)
+    for one in low.modes:  # the flight sees the air that the linear model does
+        assert one.fitted is not None
+        assert abs(one.fitted - one.mode.eigenvalue) < 2e-3 * abs(one.mode.eigenvalue), one.mode.name
+    same = damping_of_aircraft(file, altitude=3000.0)
+    assert same.steady.outputs["mach"] == pytest.approx(SPEED / SOUND, rel=1e-6)
     assert low.steady.outputs["load_factor"] == pytest.approx(GRAVITY / 9.80665, rel=1e-6)
+
+
+def test_classical_approximations_are_exact_where_they_leave_nothing_out(boeing: AircraftDamping) -> None:
+    """Without gravity, cross derivatives and CZ_q, pitching, yawing and rolling are each other's strangers."""
+    vehicle = boeing.steady.dynamics.vehicle
+    vehicle = replace(vehicle, inertia=np.diag(np.diag(vehicle.inertia)))
+    kept = {"CZ_alpha": -4.9, "Cm_alpha": -1.0, "Cm_q": -20.0, "Cm_alphadot": -6.0}
+    kept |= {"CY_beta": -0.9, "Cn_beta": 0.2, "Cn_r": -0.3, "Cl_p": -0.4}
+    loads = BodyAxisAerodynamics(reference=vehicle.reference, speed=SPEED, **kept)
+    dynamics = build_dynamics(vehicle, loads, AIR, FlatEarth(0.0))
+    values = np.linalg.eigvals(linear_flight(trim(dynamics, given={"speed": SPEED}, unknown=())).a)
+    found = classical_modes(vehicle, loads, DENSITY, SPEED, 0.0)
+    for name in ("short period", "Dutch roll", "roll"):
+        assert np.min(np.abs(values - found[name])) < 1e-9 * abs(found[name]), name
+
+
+def test_the_classical_spiral_is_the_last_two_coefficients_of_the_quartic(boeing: AircraftDamping) -> None:
+    """``-E/D`` of the lateral characteristic polynomial, but for what side force adds to D: a few per cent."""
+    at = [boeing.linear.states.index(name) for name in ("beta", "p", "r", "phi")]
+    *_, d, e = np.poly(boeing.linear.a[np.ix_(at, at)])
+    closed = boeing["spiral"].closed_form
+    assert closed is not None
+    assert closed.real == pytest.approx(-e / d, rel=0.03)
+
+
+def test_modes_that_no_requirement_is_of_are_told() -> None:
+    modes = [Mode("short period", -1 + 2j, 50.0), Mode("roll-spiral", -1 + 1j, 50.0), Mode("lag 1", -9, 50.0)]
+    rated = rate_modes("I", "B", Modes(tuple(modes), 50.0, 0.0), n_alpha=10.0)
+    assert [r.what for r in rated.ratings] == ["short-period damping", "short-period frequency"]
+    assert rated.unrated == ("roll-spiral",)
+    assert "roll-spiral" in rated.summary()
 
 
 def test_the_command_writes_numbers_and_figures(tmp_path) -> None:

@@ -1,6 +1,7 @@
 """Modes over Mach number and altitude, and damping over reduced frequency with memory."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,11 +19,13 @@ from indicial.flightsim import (
     air_at,
     aircraft_mode_sweep,
     aircraft_modes,
+    build_dynamics,
     damping_over_k,
     epicyclic_roots,
     fitted_eigenvalue,
     linear_flight,
     missile_mode_sweep,
+    missile_modes,
     rate_modes,
     sweep_modes,
     table,
@@ -142,6 +145,17 @@ def test_damping_over_k_solves_the_eigenproblem_with_h_of_s() -> None:
         inertia = FINNER.inertia[1, 1] * (found.k_here / k) ** 2
         root = nonlinear_root(model, inertia, value / SPEED * (1.0 + 1e-4))
         assert value / SPEED == pytest.approx(root, rel=1e-9)
+
+
+def test_a_missile_s_modes_are_followed_by_their_shapes() -> None:
+    """Lag modes, whose eigenvalues pass each other with the Mach number, keep their names as the shapes do."""
+    modes = missile_modes(build_dynamics(FINNER, first_order_lag(0.05)), SPEED)
+    lag, fast = modes["lag 1"], modes["fast arm"]
+    renamed = Modes(tuple(replace(m, name=f"{m.name}?") for m in reversed(modes.modes)), SPEED, 0.0)
+    sweep = sweep_modes(lambda mach, altitude: modes if mach < 1.5 else renamed, [1.0, 2.0])
+    assert sweep.names == tuple(mode.name for mode in modes.modes)
+    assert sweep["lag 1"][0, 1] == lag.eigenvalue
+    assert sweep["fast arm"][0, 1] == fast.eigenvalue
 
 
 def test_memory_does_nothing_at_low_k_and_its_effect_grows_as_the_square() -> None:

@@ -227,6 +227,7 @@ def test_all_stages_have_been_run(run):
 def test_damping_of_a_run_is_that_of_its_flight_and_its_model(run, results):
     (run.path / "case.toml").write_text(quick_text(), encoding="utf-8")
     found = damping_of_run(run.path)
+    assert found.check is not None
     flown = json.loads((run.path / "fly.json").read_text())["damping"]["derivatives"]["arms"][0]
     assert found.check.arms[0].linearised.real == pytest.approx(flown["linearised_1_s"], rel=1e-12)
     assert found.change is not None
@@ -236,6 +237,9 @@ def test_damping_of_a_run_is_that_of_its_flight_and_its_model(run, results):
     record = json.loads(json.dumps(rolling.to_dict()))
     assert record["kind"] == "missile damping"
     assert record["arms"][0]["parts_1_s"]["Cm_q"] < 0.0
-    assert set(rolling.plot()) == {"flight", "damping_parts", "over_k"}
+    assert set(rolling.plot()) == {"flight", "modes", "damping_parts", "over_k"}
+    held = damping_of_run(run.path / "results.json", mach=2.2)
+    assert any("held at Mach 2.2" in note for note in held.notes)
     thin = damping_of_run(run.path, altitude=10000.0)
+    assert thin.check is not None
     assert abs(thin.check.arms[0].linearised.real) < abs(found.check.arms[0].linearised.real)

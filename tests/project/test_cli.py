@@ -53,7 +53,7 @@ def test_wrong_input_gives_one_line_and_exit_code_2(tmp_path):
             "magic",
         ): "'magic' is not one of 'mrf', 'fom', 'irm', 'operator', 'all'",
         ("bogus",): "No such command 'bogus'",
-        ("damping", "nothing"): "no such case file",
+        ("damping", "nothing"): "packaged aircraft: boeing_747.toml",
         ("damping", "basic_finner_quick"): "not there yet",
         ("damping", "boeing_747", "--mach", "-1"): "Mach number is -1.0, must be positive",
         ("damping", "boeing_747", "--roll-rate", "3"): "--roll-rate is for missiles",

@@ -14,7 +14,10 @@ if TYPE_CHECKING:
 
 Source = Annotated[
     str,
-    typer.Argument(metavar="SOURCE", help="The folder of a run (or its case file), or an aircraft file (`.toml`)."),
+    typer.Argument(
+        metavar="SOURCE",
+        help="A run folder (or its case file or `results.json`), or an aircraft file (`.toml`).",
+    ),
 ]
 Roll = Annotated[
     float | None, typer.Option("--roll-rate", help="Roll rate of a missile [deg/s]; the case's if not given.")
@@ -42,7 +45,7 @@ def damping(
     json_file: Json = None,
     figures: Figures = None,
 ) -> None:
-    """Modes and their damping: linear model, fitted flight and closed form; what it is made of; and a verdict.
+    """Modes and their damping: linear model, decay of a flight, closed form; what it is made of; and a verdict.
 
     Of a run, the missile's two arms: dynamic stability with or without roll, and what the reduced-order model changes
     over the reduced frequency. Of an aircraft file, all modes with their levels of MIL-F-8785C.
@@ -54,11 +57,14 @@ def damping(
     found = _found(source, roll_rate, mach, altitude)
     typer.echo(found.summary())
     if json_file is not None:
-        write_text(json_file, json.dumps(found.to_dict(), indent=1))
+        write_text(json_file, json.dumps(found.to_dict(), indent=1, allow_nan=False))
         typer.echo(f"written: {json_file}")
     if figures is not None:
+        from indicial.errors import InputError
         from indicial.report.style import figure_style, save
 
+        if figures.is_file():
+            raise InputError(f"{figures} is a file; --figures must name a folder")
         with figure_style():
             for name, figure in found.plot().items():
                 typer.echo(f"figure: {save(figure, figures / f'{name}.png')}")
@@ -81,5 +87,20 @@ def _found(
         if roll_rate is not None:
             raise InputError("--roll-rate is for missiles: an aircraft file is of a flight that does not roll")
         return damping_of_aircraft(file, mach=mach, altitude=altitude)
+    _exists(source)
     rate = None if roll_rate is None else math.radians(roll_rate)
     return damping_of_run(source, roll_rate=rate, mach=mach, altitude=altitude)
+
+
+def _exists(source: str) -> None:
+    """Refuse what is neither on disk nor packaged, naming the packaged cases and aircraft."""
+    from indicial.errors import InputError
+    from indicial.reference_data import data_folder, find_case
+
+    if Path(source).exists() or not source.strip():
+        return
+    try:
+        find_case(source)
+    except InputError as error:
+        known = ", ".join(sorted(item.name for item in (data_folder() / "aircraft").iterdir()))
+        raise InputError(f"{error}; packaged aircraft: {known}") from None

@@ -10,6 +10,7 @@ from indicial.flightsim.aerodynamics import (
     Validity,
 )
 from indicial.flightsim.aircraft import BodyAxisAerodynamics
+from indicial.flightsim.aircraft_closed_forms import classical_modes
 from indicial.flightsim.aircraft_damping import AircraftDamping, ModeDamping, aircraft_damping
 from indicial.flightsim.aircraft_modes import aircraft_modes
 from indicial.flightsim.atmosphere import Air, Atmosphere, ConstantAtmosphere, StandardAtmosphere, air_at
@@ -18,6 +19,7 @@ from indicial.flightsim.damping import (
     ArmDamping,
     DampingChange,
     DampingCheck,
+    arm_decay,
     check_damping,
     epicyclic_roots,
     holding_roll,
@@ -123,10 +125,12 @@ __all__ = [
     "aircraft_damping",
     "aircraft_mode_sweep",
     "aircraft_modes",
+    "arm_decay",
     "axisymmetric_inertia",
     "basic_finner_range_model",
     "build_dynamics",
     "check_damping",
+    "classical_modes",
     "compare",
     "damping_over_k",
     "damping_sensitivity",

@@ -1,9 +1,10 @@
 r"""Damping of an aircraft's modes: how much, how sure, what of, what level.
 
-Each mode's eigenvalue is the linear model's, the one fitted to a nonlinear flight (`mode_decay`) and that of a model of
-few states: the mode's own, with faster ones settled and slower ones still (short period: alpha, q; Dutch roll: beta, r;
-roll: p; phugoid: V, theta; spiral: phi). What an aerodynamic derivative v counts for is the exact gradient through left
-and right eigenvectors, ``d lambda/dv = y^H (dA/dv) x/(y^H x)``, and ``v dRe(lambda)/dv`` is its part of the damping.
+Each mode's eigenvalue is the linear model's, the one fitted to a nonlinear flight (`mode_decay`) and that of the
+classical closed form (`aircraft_closed_forms`). What an aerodynamic derivative v counts for is the exact gradient
+through left and right eigenvectors, ``d lambda/dv = y^H (dA/dv) x/(y^H x)``, and ``v dRe(lambda)/dv`` is its part of
+the damping. The air is held as it is at the flight's altitude, in the linear model and in the flight alike: its change
+with height, which the phugoid feels, is left out as it is of the classical modes.
 """
 
 from __future__ import annotations
@@ -19,8 +20,9 @@ import numpy as np
 from indicial.conventions import Array
 from indicial.errors import InputError
 from indicial.flightsim.aircraft import BodyAxisAerodynamics
-from indicial.flightsim.aircraft_modes import GROUPS, aircraft_modes
-from indicial.flightsim.atmosphere import Atmosphere
+from indicial.flightsim.aircraft_closed_forms import classical_modes
+from indicial.flightsim.aircraft_modes import aircraft_modes
+from indicial.flightsim.atmosphere import Atmosphere, ConstantAtmosphere, air_at
 from indicial.flightsim.dynamics import build_dynamics
 from indicial.flightsim.earth import FlatEarth
 from indicial.flightsim.expressions import is_number
@@ -32,10 +34,6 @@ from indicial.flightsim.trim import Trim, trim
 from indicial.flightsim.vehicle import Vehicle
 
 BALANCED = ("CX_0", "CZ_0", "Cm_0")
-_FASTER = {
-    "phugoid": ("alpha", "q"),
-    "spiral": ("beta", "r", "p"),
-}
 _SMALL_PART = 0.02  # of the damping; smaller parts are not told in the summary
 
 
@@ -48,8 +46,8 @@ class ModeDamping:
     mode : Mode
     fitted : complex or None
         Eigenvalue fitted to a nonlinear flight [1/s]; None for a neutral mode.
-    few_states : complex or None
-        Eigenvalue of the model of few states; None for a coupled mode.
+    closed_form : complex or None
+        Eigenvalue by the classical approximation [1/s]; None for a coupled mode.
     gradient : mapping of str to complex
         d eigenvalue/d derivative [1/s].
     values : mapping of str to float
@@ -60,7 +58,7 @@ class ModeDamping:
 
     mode: Mode
     fitted: complex | None
-    few_states: complex | None
+    closed_form: complex | None
     gradient: Mapping[str, complex]
     values: Mapping[str, float]
     uncertainties: Mapping[str, float]
@@ -102,7 +100,7 @@ class ModeDamping:
             "name": self.mode.name,
             "eigenvalue_1_s": pair(self.mode.eigenvalue),
             "fitted_1_s": pair(self.fitted),
-            "few_states_1_s": pair(self.few_states),
+            "closed_form_1_s": pair(self.closed_form),
             "damping_ratio": self.mode.damping_ratio,
             "damping_ratio_standard_error": self.ratio_standard_error,
             "damping_standard_error_1_s": self.standard_error,
@@ -141,12 +139,12 @@ class AircraftDamping:
         name, speed = self.steady.dynamics.vehicle.name, self.steady.variables["speed"]
         lines = [
             f"{name}: modes at {speed:.5g} m/s, Mach {self.steady.outputs['mach']:.3g}",
-            f"  {'mode':<14}{'damping':>11}{'fitted':>11}{'few states':>12}{'frequency':>11}{'ratio':>9}{'+-':>9}"
+            f"  {'mode':<14}{'damping':>11}{'fitted':>11}{'closed form':>12}{'frequency':>11}{'ratio':>9}{'+-':>9}"
             "  halves/doubles",
         ]
         for one in self.modes:
             m = one.mode
-            fitted, few = ("-" if x is None else f"{x.real:.5g}" for x in (one.fitted, one.few_states))
+            fitted, few = ("-" if x is None else f"{x.real:.5g}" for x in (one.fitted, one.closed_form))
             time = f"doubles in {m.time_to_double:.3g} s" if m.damping > 0.0 else f"halves in {m.time_to_half:.3g} s"
             error = f"{one.ratio_standard_error:.2g}" if one.uncertainties else "-"
             lines.append(
@@ -180,6 +178,7 @@ class AircraftDamping:
                     {"what": r.what, "paragraph": r.paragraph, "value": r.value, "level": r.level}
                     for r in self.qualities.ratings
                 ],
+                "unrated": list(self.qualities.unrated),
             },
         }
 
@@ -246,15 +245,18 @@ def aircraft_damping(
         if name not in values:
             raise InputError(f"uncertainty of {name}, which is no derivative here; there are {', '.join(values)}")
     symbols: dict[str, Any] = {name: ca.SX.sym(name) for name in (*BALANCED, *values)}
-    dynamics = build_dynamics(vehicle, replace(aerodynamics, **symbols), atmosphere, FlatEarth(gravity))
+    here = air_at(atmosphere, altitude)
+    air = ConstantAtmosphere(float(here.temperature), float(here.pressure))
+    dynamics = build_dynamics(vehicle, replace(aerodynamics, **symbols), air, FlatEarth(gravity))
     given = {"speed": speed, "altitude": altitude, "path_angle": path_angle, **values}
     steady = trim(dynamics, unknown=BALANCED, given=given)
     linear = linear_flight(steady, outputs=("load_factor",))
     modes = aircraft_modes(linear)
     n_alpha = float(linear.c[0, linear.states.index("alpha")])
     slopes = matrix_derivatives(linear, tuple(values))
+    closed = classical_modes(vehicle, aerodynamics, float(here.density), speed, gravity)
     made = [
-        ModeDamping(mode, _fit(linear, mode), _few_states(linear, mode.name), gradient, values, errors)
+        ModeDamping(mode, _fit(linear, mode), closed.get(mode.name), gradient, values, errors)
         for mode, gradient in ((m, dict(zip(values, _gradient(linear.a, m, slopes), strict=True))) for m in modes.modes)
     ]
     qualities = rate_modes(aircraft_class, category, modes, n_alpha=n_alpha if n_alpha > 0.0 else None)
@@ -285,17 +287,3 @@ def _gradient(matrix: Array, mode: Mode, slopes: Array) -> list[complex]:
 
 def _fit(linear: LinearFlight, mode: Mode) -> complex | None:
     return None if abs(mode.eigenvalue) < 1e-8 else fitted_eigenvalue(linear, mode)
-
-
-def _few_states(linear: LinearFlight, name: str) -> complex | None:
-    """Eigenvalue of the mode's own states, faster ones settled."""
-    if name not in GROUPS or not all(state in linear.states for state in GROUPS[name]):
-        return None
-    own = [linear.states.index(state) for state in GROUPS[name]]
-    block = linear.a[np.ix_(own, own)]
-    if name in _FASTER:
-        fast = [linear.states.index(state) for state in _FASTER[name]]
-        settled = np.linalg.solve(linear.a[np.ix_(fast, fast)], linear.a[np.ix_(fast, own)])
-        block = block - linear.a[np.ix_(own, fast)] @ settled
-    values = np.linalg.eigvals(block)
-    return complex(values[int(np.argmax(values.imag))])

@@ -1,6 +1,6 @@
-r"""Damping of a missile, three ways: linearised model, decay of the simulated flight, closed form.
+r"""Damping of a missile, four ways: linearised model, decay and epicyclic fit of the simulated flight, closed form.
 
-All three are the same quantity: how fast the angles grow or die out over distance, times V [1/s]. Over distance
+All of them are the same quantity: how fast the angles grow or die out over distance, times V [1/s]. Over distance
 
     xi'' + (H - iP) xi' - (M + iPT) xi = 0,    lambda = (-(H - iP) +- sqrt((H - iP)^2 + 4 (M + iPT)))/2
 
@@ -76,19 +76,27 @@ def epicyclic_roots(
 
 @dataclass(frozen=True)
 class ArmDamping:
-    """One arm, three ways.
+    """One arm, four ways.
 
     Parameters
     ----------
     name : str
     linearised, fitted, closed_form : complex
         Eigenvalue [1/s]: damping (real) and turning rate (imaginary), over distance times V.
+    decay : float
+        Damping [1/s] by the logarithmic decrement of this arm in the flight (`arm_decay`).
     """
 
     name: str
     linearised: complex
     fitted: complex
     closed_form: complex
+    decay: float
+
+    @property
+    def decay_difference(self) -> float:
+        """Decay of the flight, relative to the linearised damping, less 1."""
+        return self.decay / self.linearised.real - 1.0
 
     @property
     def fit_difference(self) -> float:
@@ -103,7 +111,7 @@ class ArmDamping:
 
 @dataclass(frozen=True)
 class DampingCheck:
-    """Damping of both arms, three ways.
+    """Damping of both arms, four ways.
 
     Parameters
     ----------
@@ -133,17 +141,19 @@ class DampingCheck:
     trajectory: Trajectory
 
     def summary(self) -> str:
-        """The three values and their differences, and a verdict."""
+        """The values and their differences, and a verdict."""
         lines = [
             f"damping at {self.speed:.5g} m/s (Mach {self.mach:.4g}), roll rate {self.roll_rate:.4g} rad/s",
             f"  {self.model}",
-            f"  {'arm':<10}{'linearised':>14}{'fitted':>14}{'closed form':>14}  1/s",
+            f"  {'arm':<10}{'linearised':>14}{'decay':>14}{'fitted':>14}{'closed form':>14}  1/s",
         ]
         for arm in self.arms:
-            values = "".join(f"{v.real:>14.6g}" for v in (arm.linearised, arm.fitted, arm.closed_form))
+            four = (arm.linearised.real, arm.decay, arm.fitted.real, arm.closed_form.real)
+            values = "".join(f"{v:>14.6g}" for v in four)
             lines.append(
-                f"  {arm.name:<10}{values}  fitted {arm.fit_difference:+.3%}, closed form "
-                f"{arm.closed_form_difference:+.3%}; turning {arm.linearised.imag:.6g} rad/s"
+                f"  {arm.name:<10}{values}  decay {arm.decay_difference:+.3%}, fitted "
+                f"{arm.fit_difference:+.3%}, closed form {arm.closed_form_difference:+.3%}; "
+                f"turning {arm.linearised.imag:.6g} rad/s"
             )
         verdict = "stable" if all(arm.linearised.real < 0.0 for arm in self.arms) else "UNSTABLE"
         lines.append(f"  dynamically {verdict}; at constant speed each value is {self.slowing:.4g} 1/s less")
@@ -207,6 +217,31 @@ class DampingChange:
         return "\n".join(lines)
 
 
+def arm_decay(trajectory: Trajectory, other: complex, *, skip: float = 0.0) -> float:
+    r"""Damping [1/m] of one arm by the logarithmic decrement of a flight from which the other arm is filtered out.
+
+    With ``xi = K_1 e^{lambda_1 s} + K_2 e^{lambda_2 s}`` (no trim), ``xi' - lambda_2 xi`` holds the first arm alone:
+    the slope of the logarithm of its size, by least squares, is ``Re lambda_1``. The derivative is that of a spline
+    of fifth order.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    other : complex
+        lambda_2 [1/m].
+    skip : float
+        Distance left out at the start [m].
+    """
+    from scipy.interpolate import make_interp_spline
+
+    s, xi = trajectory.distance, trajectory.non_rolling_incidence
+    alone = np.abs(make_interp_spline(s, xi, k=5).derivative()(s) - other * xi)
+    kept = s >= skip
+    edge = 5  # where the spline has neighbours on one side only
+    slope, _ = np.polyfit(s[kept][edge:-edge], np.log(alone[kept][edge:-edge]), 1)
+    return float(slope)
+
+
 def holding_roll(vehicle: Vehicle, aerodynamics: SymmetricMissile, speed: float, roll_rate: float) -> SymmetricMissile:
     """The model with the fin cant that holds ``p/V`` against roll damping while drag slows the missile down.
 
@@ -231,7 +266,7 @@ def check_damping(
     wavelengths: float = 6.0,
     step: float | None = None,
 ) -> DampingCheck:
-    """Damping of a missile: linearised, fitted to a nonlinear flight, and by the closed form of its derivatives.
+    """Damping of a missile: linearised, read from a nonlinear flight twice, and by the closed form of its derivatives.
 
     The flight is straight (no gravity), starts at an angle of attack with its lag states settled, and holds p/V by
     fin cant. The fit leaves out the start, until the aerodynamic transient of release has died out.
@@ -285,10 +320,18 @@ def check_damping(
         step, every, method = 0.5 * step, 2 * kept, suggest_method(kept)
     trajectory = fly(dynamics, initial, duration, step=step, every=every, method=method)
     transient = max((10.0 / abs(mode.per_metre.real) for mode in modes.lag), default=0.0)
-    fit = fit_trajectory(trajectory, trim=False, skip=min(transient, 0.25 * distance))
+    skip = min(transient, 0.25 * distance)
+    fit = fit_trajectory(trajectory, trim=False, skip=skip)
+    names = ("fast arm", "slow arm")
     arms = tuple(
-        ArmDamping(name, modes[name].eigenvalue, fitted.eigenvalue * speed, root * speed)
-        for name, fitted, root in zip(("fast arm", "slow arm"), (fit.fast, fit.slow), closed, strict=True)
+        ArmDamping(
+            name=name,
+            linearised=modes[name].eigenvalue,
+            fitted=fitted.eigenvalue * speed,
+            closed_form=root * speed,
+            decay=arm_decay(trajectory, modes[other].per_metre, skip=skip) * speed,
+        )
+        for name, other, fitted, root in zip(names, names[::-1], (fit.fast, fit.slow), closed, strict=True)
     )
     return DampingCheck(
         arms=(arms[0], arms[1]),

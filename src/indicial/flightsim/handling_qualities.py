@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 CLASSES = ("I", "II", "II-L", "II-C", "III", "IV")
 CATEGORIES = ("A", "B", "C")
+_RATED = ("short period", "phugoid", "Dutch roll", "roll", "spiral")
 
 _ANY = math.inf
 # Table IV: least and greatest damping ratio of the short period, levels 1 to 3.
@@ -67,11 +68,14 @@ class HandlingQualities:
     ----------
     aircraft_class, category : str
     ratings : tuple of Rating
+    unrated : tuple of str
+        Modes that no requirement is of: coupled ones, or a pair that does not oscillate.
     """
 
     aircraft_class: str
     category: str
     ratings: tuple[Rating, ...]
+    unrated: tuple[str, ...] = ()
 
     def __getitem__(self, what: str) -> Rating:
         for rating in self.ratings:
@@ -89,6 +93,7 @@ class HandlingQualities:
         """A line for each requirement."""
         lines = [f"MIL-F-8785C, class {self.aircraft_class}, category {self.category}: {_say(self.level)}"]
         lines += [f"  {r.what:<24}{_say(r.level):<20}{r.value}  (par. {r.paragraph})" for r in self.ratings]
+        lines += [f"  {name:<24}not rated: no requirement is of it" for name in self.unrated]
         return "\n".join(lines)
 
 
@@ -112,7 +117,7 @@ def rate_modes(
         One of `CLASSES`, `CATEGORIES`.
     modes : Modes, optional
         Of `aircraft_modes`: those of their names that are there are rated, but for the ones given below. Coupled modes
-        ("roll-spiral") have other names, and no requirement here.
+        ("roll-spiral") have other names and no requirement here: they are told as not rated.
     short_period, phugoid, dutch_roll : complex, optional
         One of each pair.
     n_alpha : float, optional
@@ -129,7 +134,10 @@ def rate_modes(
         raise InputError(f"aircraft class {aircraft_class!r} is none of {', '.join(CLASSES)}")
     if category not in CATEGORIES:
         raise InputError(f"flight phase category {category!r} is none of {', '.join(CATEGORIES)}")
+    unrated: tuple[str, ...] = ()
     if modes is not None:
+        others = (mode.name for mode in modes.modes if mode.name not in _RATED)
+        unrated = tuple(name for name in others if not name.startswith(("lag", "altitude")))
         own = {mode.name: mode.eigenvalue for mode in modes.modes}
         short_period = own.get("short period") if short_period is None else short_period
         phugoid = own.get("phugoid") if phugoid is None else phugoid
@@ -158,7 +166,7 @@ def rate_modes(
         ratings.append(Rating("spiral", "3.3.1.3", said, _level(lambda i: double >= least[i])))
     if not ratings:
         raise InputError("no mode to rate: give short_period, phugoid, dutch_roll, roll or spiral")
-    return HandlingQualities(aircraft_class, category, tuple(ratings))
+    return HandlingQualities(aircraft_class, category, tuple(ratings), unrated)
 
 
 def _short_period(root: complex, n_alpha: float | None, category: str, nimble: bool) -> list[Rating]:

@@ -5,8 +5,8 @@ From one point to the next modes are paired so that the sum of their modal assur
     MAC = |x^H y|^2 / ((x^H x)(y^H y)),
 
 x and y the shapes at the two points (V over the speed, rates over the mode's frequency), less how far the eigenvalue
-has moved over its size: modes that cross or meet keep their names. Modes without shapes (`missile_modes`) are paired by
-their eigenvalues. Source: Allemang & Brown, Proc. 1st Int. Modal Analysis Conf. (1982) 110.
+has moved over its size: modes that cross or meet keep their names. Modes without shapes are paired by their
+eigenvalues. Source: Allemang & Brown, Proc. 1st Int. Modal Analysis Conf. (1982) 110.
 """
 
 from __future__ import annotations
@@ -277,7 +277,13 @@ def _likeness(one: Mode, other: Mode) -> float:
 
 
 def _scaled(mode: Mode) -> dict[str, complex]:
-    """Shape in angles: V over the speed, rates over the mode's frequency; altitude and lag states left out."""
+    """Shape in angles: V over the speed, rates over the mode's frequency; altitude and lag states left out.
+
+    Of a missile all states, the rate over the eigenvalue's size per metre: a lag mode has the incidence of an arm, and
+    only its lag states tell them apart.
+    """
+    if "incidence" in mode.shape:
+        return {**mode.shape, "rate": mode.shape["rate"] / max(abs(mode.per_metre), math.ulp(1.0))}
     size = {"V": mode.speed, **dict.fromkeys(_RATES, max(mode.natural_frequency, math.ulp(1.0)))}
     return {
         name: value / size.get(name, 1.0)

@@ -69,7 +69,9 @@ class Mode:
     speed : float
         [m/s].
     shape : mapping of str to complex
-        Eigenvector of an aircraft's mode by states, the largest of V/speed and the angles scaled to 1.
+        Eigenvector by states: of an aircraft's mode with the largest of V/speed and the angles scaled to 1; of a
+        missile's the incidence ``(v + iw)/V``, the rate ``(q + ir)/V`` [1/m], lag states ``yaw + i pitch`` and p,
+        scaled so that the incidence (in the roll mode p) is 1.
     participation : mapping of str to float
         Share of each state in an aircraft's mode, of sum 1.
     """
@@ -162,18 +164,21 @@ class Modes:
         return "\n".join(lines)
 
     def plot(self) -> Figure:
-        """Eigenvalues, and the phasors of V/speed and the angles in each mode that oscillates.
+        """Eigenvalues, and the phasors of each mode that oscillates.
+
+        Of an aircraft those of V/speed and the angles, of a missile those of the incidence and the rate (over the
+        arm's own turning).
 
         Raises
         ------
         InputError
-            If the modes have no shapes, as those of `missile_modes`.
+            If the modes have no shapes.
         """
         import matplotlib.pyplot as plt
 
         turning = [mode for mode in self.modes if mode.shape and mode.frequency]
         if not any(mode.shape for mode in self.modes):
-            raise InputError("these modes have no shapes to draw: those of aircraft_modes have")
+            raise InputError("these modes have no shapes to draw")
         figure = plt.figure(figsize=(4.2 * (1 + len(turning)), 4.2), layout="constrained")
         plane = figure.add_subplot(1, 1 + len(turning), 1)
         for mode in self.modes:
@@ -194,7 +199,10 @@ class Modes:
 
 
 def _phasors(mode: Mode) -> dict[str, complex]:
-    """What a mode's picture shows: V/speed and angles, those that can be seen."""
+    """What a mode's picture shows: V/speed and angles, those that can be seen; of a missile incidence and rate."""
+    if "incidence" in mode.shape:
+        turning = mode.shape["rate"] / abs(mode.per_metre)
+        return {"(v + iw)/V": mode.shape["incidence"], "(q + ir)/|lambda|": turning}
     angles = {name: mode.shape[name] for name in ("alpha", "theta", "beta", "phi") if name in mode.shape}
     every = {"V/speed": mode.shape["V"] / mode.speed, **angles}
     return {name: value for name, value in every.items() if abs(value) > 0.01}
@@ -242,13 +250,25 @@ def missile_modes(
     model = linearise(dynamics, dynamics.initial_vector(initial, values), parameters)
     planes = complex_plane(over_distance(model, speed), dynamics.lag_states // 2)
     turning = 1j * roll_rate / speed
-    found = [complex(value) + turning for value in np.linalg.eigvals(planes)]
+    values_found, vectors = np.linalg.eig(planes)
+    found = [complex(value) + turning for value in values_found]
+    shapes = {value: _missile_shape(vectors[:, i]) for i, value in enumerate(found)}
     near = [complex(value) + turning for value in np.linalg.eigvals(_without_lag(planes))]
     arms = [found.pop(int(np.argmin([abs(value - guess) for value in found]))) for guess in near]
     fast, slow = order_arms(*arms)
-    named = [("fast arm", fast * speed), ("slow arm", slow * speed), ("roll", complex(model.block(("p",))[0, 0]))]
-    named += [(f"lag {i + 1}", value * speed) for i, value in enumerate(sorted(found, key=lambda v: -v.real))]
-    return Modes(tuple(Mode(name, value, speed) for name, value in named), speed, roll_rate)
+    named = {"fast arm": fast, "slow arm": slow}
+    named |= {f"lag {i + 1}": value for i, value in enumerate(sorted(found, key=lambda v: -v.real))}
+    modes = [Mode(name, value * speed, speed, shapes[value]) for name, value in named.items()]
+    rolling = dict.fromkeys(modes[0].shape, 0j) | {"p": 1.0 + 0j}
+    modes.insert(2, Mode("roll", complex(model.block(("p",))[0, 0]), speed, rolling))
+    return Modes(tuple(modes), speed, roll_rate)
+
+
+def _missile_shape(vector: Complex) -> dict[str, complex]:
+    """Eigenvector of the complex plane by states, its incidence 1."""
+    scaled = vector / vector[0]
+    names = ("incidence", "rate", *(f"lag {i + 1}" for i in range(len(vector) - 2)))
+    return dict(zip(names, (complex(value) for value in scaled), strict=True)) | {"p": 0j}
 
 
 def over_distance(model: LinearModel, speed: float) -> Array:

@@ -34,7 +34,7 @@ def damping_of_run(
     Parameters
     ----------
     target : path
-        A run folder, or the case file of one.
+        A run folder, its ``results.json``, or the case file of one.
     roll_rate : float, optional
         [rad/s]; the case's if not given.
     mach, altitude : float, optional
@@ -46,7 +46,8 @@ def damping_of_run(
     InputError
         If the run lacks the stages `mrf`, `irm` or `rom`.
     """
-    case, folder = open_run(target)
+    given = Path(target)
+    case, folder = open_run(given.parent if given.name == "results.json" and given.is_file() else target)
     context = Context(case, folder, 1, LogReporter(), finite_volume)
     body = vehicle(context)
     derivatives, model = aerodynamics(context)
@@ -54,6 +55,9 @@ def damping_of_run(
     speed = case.flight_condition.speed
     if mach is not None or altitude is not None:
         speed = _positive(case.condition.mach if mach is None else mach) * float(air_at(air, height).speed_of_sound)
+    notes = ["uncertainties are those of the methods (amplitude, scatter, quadrature), not of mesh and gas model"]
+    if mach is not None and mach != case.condition.mach:
+        notes.append(f"derivatives and model are those of Mach {case.condition.mach:g}, held at Mach {mach:g}")
     known = {r.name: r.uncertainty for r in flown_derivatives(context) if r.uncertainty is not None}
     return missile_damping(
         body,
@@ -64,6 +68,7 @@ def damping_of_run(
         atmosphere=air,
         altitude=height,
         uncertainties={name: error for name, error in known.items() if name in NAMES},
+        notes=tuple(notes),
     )
 
 
@@ -76,7 +81,7 @@ def damping_of_aircraft(
     ----------
     path : path
     mach, altitude : float, optional
-        Instead of the file's speed and air; the derivatives stay, and the loads are balanced anew.
+        Instead of the file's Mach number and air; the derivatives stay, and the loads are balanced anew.
 
     Raises
     ------
@@ -88,8 +93,9 @@ def damping_of_aircraft(
     own = ConstantAtmosphere(here.temperature_K, here.density_kg_m3 * GAS_CONSTANT * here.temperature_K)
     air, height = _air(altitude, own)
     speed = here.speed_m_s
-    if mach is not None:
-        speed = _positive(mach) * float(air_at(air, height).speed_of_sound)
+    if mach is not None or altitude is not None:
+        number = speed / float(air_at(own, 0.0).speed_of_sound) if mach is None else _positive(mach)
+        speed = number * float(air_at(air, height).speed_of_sound)
     return aircraft_damping(
         file.vehicle,
         file.aerodynamics(speed),

@@ -140,6 +140,7 @@ def _damping_record(check: DampingCheck) -> dict[str, Any]:
             {
                 "name": arm.name,
                 "linearised_1_s": arm.linearised.real,
+                "decay_1_s": arm.decay,
                 "fitted_1_s": arm.fitted.real,
                 "closed_form_1_s": arm.closed_form.real,
                 "turning_rad_s": arm.linearised.imag,
