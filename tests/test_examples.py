@@ -9,7 +9,7 @@ EXAMPLES = sorted((Path(__file__).resolve().parents[1] / "examples").glob("*.py"
 
 
 def test_there_is_an_example_for_every_stage():
-    assert sorted(int(path.name.partition("_")[0]) for path in EXAMPLES) == list(range(1, 14))
+    assert sorted(int(path.name.partition("_")[0]) for path in EXAMPLES) == list(range(1, 15))
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)

@@ -19,6 +19,7 @@ from indicial.flightsim import (
     FunctionForce,
     InitialState,
     LinearFlight,
+    Signal,
     StandardAtmosphere,
     Trim,
     aircraft_modes,
@@ -178,6 +179,31 @@ def test_control_and_a_flight_answer_alike_in_a_turn() -> None:
         difference = (flown[0] - flown[1]) / (2.0 * amplitude)
         largest = np.max(np.abs(difference), axis=1)
         assert np.all(np.abs(response - difference) <= 1e-5 * largest[:, None]), name
+
+
+def test_frequency_response_is_that_of_a_nonlinear_flight_with_a_swinging_control() -> None:
+    """Half the difference of two flights with opposite small swings of the elevator, after the short period has gone.
+
+    What is left of the phugoid is fitted beside the swing. The signal is linear over hundredths of a second, which
+    makes the swing smaller by (omega dt)^2/12, 1e-4.
+    """
+    about, omega, amplitude = level(), 3.0, 1e-4
+    linear = linear_flight(about, controls=("elevator",), outputs=("q", "alpha"))
+    start = InitialState(about.state[3:6], about.state[6:10], about.state[10:13], about.state[:3])
+    swung = []
+    for size in (amplitude, -amplitude):
+        swing = Signal.sampled(lambda t, a=size: about.parameters["elevator"] + a * np.sin(omega * t), 30.0, 0.01)
+        moved = {**about.parameters, "elevator": swing}
+        flight = fly(about.dynamics, start, 30.0, step=0.01, parameters=moved, method="rk4", estimate_error=False)
+        swung.append(np.array([flight.rate[:, 1], np.arctan2(flight.velocity[:, 2], flight.velocity[:, 0])]))
+    late = flight.time > 12.0
+    time, seen = flight.time[late], ((swung[0] - swung[1]) / (2.0 * amplitude))[:, late]
+    slow = np.exp(aircraft_modes(linear)["phugoid"].eigenvalue * time)
+    columns = np.stack([np.sin(omega * time), np.cos(omega * time), slow.real, slow.imag], axis=1)
+    in_phase, quadrature, *_ = np.linalg.lstsq(columns, seen.T, rcond=None)[0]
+    bode = control.frequency_response(linear.to_control(), [omega])
+    response = bode.magnitude[:, 0, 0] * np.exp(1j * bode.phase[:, 0, 0])
+    assert np.all(np.abs(in_phase + 1j * quadrature - response) < 1e-3 * np.abs(response))
 
 
 def test_modes_of_the_747_are_those_published() -> None:

@@ -11,7 +11,7 @@ from indicial.flightsim.aerodynamics import (
 )
 from indicial.flightsim.aircraft import BodyAxisAerodynamics
 from indicial.flightsim.aircraft_closed_forms import classical_modes
-from indicial.flightsim.aircraft_damping import AircraftDamping, ModeDamping, aircraft_damping
+from indicial.flightsim.aircraft_damping import AircraftDamping, ModeDamping, aircraft_damping, balanced_flight
 from indicial.flightsim.aircraft_modes import aircraft_modes
 from indicial.flightsim.atmosphere import Air, Atmosphere, ConstantAtmosphere, StandardAtmosphere, air_at
 from indicial.flightsim.comparison import ArmDifference, TrajectoryComparison, compare, swerve
@@ -127,6 +127,7 @@ __all__ = [
     "aircraft_modes",
     "arm_decay",
     "axisymmetric_inertia",
+    "balanced_flight",
     "basic_finner_range_model",
     "build_dynamics",
     "check_damping",

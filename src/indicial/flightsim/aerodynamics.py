@@ -25,9 +25,10 @@ from typing import Any, Literal, NamedTuple, Protocol
 import casadi as ca
 
 from indicial.conventions import ReferenceQuantities, transfer_longitudinal
-from indicial.derivatives import DerivativeTable
+from indicial.derivatives import Derivative, DerivativeTable
 from indicial.errors import InputError
-from indicial.flightsim.expressions import free_symbols
+from indicial.flightsim.expressions import MACH, free_symbols
+from indicial.flightsim.expressions import table as look_up
 
 LagAxes = Literal["non_rolling", "body"]
 
@@ -265,19 +266,53 @@ class DerivativeAerodynamics(SymmetricMissile):
         if unknown:
             raise InputError(f"unknown derivatives {', '.join(sorted(unknown))}; there are {', '.join(DERIVATIVES)}")
         records = [table.one(name) for name in DERIVATIVES if name not in given]
-        references = {
-            ReferenceQuantities(
-                length=r.reference_length_m,
-                area=r.reference_area_m2,
-                moment_reference=r.moment_reference_m,
-                rate_normalisation=r.rate_normalisation,
-            )
-            for r in records
-        }
-        if len(references) != 1:
-            raise InputError(f"the derivatives of a model must share one reference, these have {len(references)}")
+        reference = _reference(records)
         values = {r.name: r.value for r in records} | given
-        return cls(reference=references.pop(), Cl_0=Cl_0, lag_axes=lag_axes, validity=validity or Validity(), **values)
+        return cls(reference=reference, Cl_0=Cl_0, lag_axes=lag_axes, validity=validity or Validity(), **values)
+
+    @classmethod
+    def over_mach(
+        cls, table: DerivativeTable, *, Cl_0: float = 0.0, lag_axes: LagAxes = "non_rolling", **given: Any
+    ) -> DerivativeAerodynamics:
+        """The model of a table that holds records at several Mach numbers: each value linear in the Mach number.
+
+        It is valid between the greatest of the first and the least of the last Mach numbers.
+
+        Parameters
+        ----------
+        table : DerivativeTable
+            For each name in `DERIVATIVES` that is not given, two or more records of different Mach numbers, each once.
+        **given : float or expression
+            Values that the table lacks, or that replace the table's, in the table's normalisation.
+
+        Raises
+        ------
+        InputError
+            If a name has fewer than two records or two at one Mach number, or the records do not share one reference.
+        """
+        unknown = set(given) - set(DERIVATIVES)
+        if unknown:
+            raise InputError(f"unknown derivatives {', '.join(sorted(unknown))}; there are {', '.join(DERIVATIVES)}")
+        rows = {
+            name: sorted(table.select(name=name), key=lambda record: record.mach)
+            for name in DERIVATIVES
+            if name not in given
+        }
+        machs = {name: [record.mach for record in records] for name, records in rows.items()}
+        for name, nodes in machs.items():
+            if len(nodes) < 2 or len(set(nodes)) < len(nodes):
+                raise InputError(
+                    f"{name} needs two or more records, each of another Mach number, has {len(nodes)} at "
+                    f"{len(set(nodes))}: select from the table, or give it"
+                )
+        if not rows:
+            raise InputError("every derivative is given: there is nothing to look up in the table")
+        values = {name: look_up(MACH, machs[name], [r.value for r in records]) for name, records in rows.items()}
+        reach = Validity(
+            mach_min=max(nodes[0] for nodes in machs.values()), mach_max=min(nodes[-1] for nodes in machs.values())
+        )
+        reference = _reference(record for records in rows.values() for record in records)
+        return cls(reference=reference, Cl_0=Cl_0, lag_axes=lag_axes, validity=reach, **(values | given))
 
     def with_symbols(self, names: Iterable[str]) -> DerivativeAerodynamics:
         """The model with the named values replaced by casadi symbols of the same names."""
@@ -336,3 +371,19 @@ class DerivativeAerodynamics(SymmetricMissile):
         """The derivatives in one line."""
         values = ", ".join(f"{name} {getattr(self, name)!s:.8}" for name in DERIVATIVES)
         return f"derivative model: {values}"
+
+
+def _reference(records: Iterable[Derivative]) -> ReferenceQuantities:
+    """What all of the records refer to."""
+    references = {
+        ReferenceQuantities(
+            length=r.reference_length_m,
+            area=r.reference_area_m2,
+            moment_reference=r.moment_reference_m,
+            rate_normalisation=r.rate_normalisation,
+        )
+        for r in records
+    }
+    if len(references) != 1:
+        raise InputError(f"the derivatives of a model must share one reference, these have {len(references)}")
+    return references.pop()

@@ -244,23 +244,49 @@ def aircraft_damping(
     for name in errors:
         if name not in values:
             raise InputError(f"uncertainty of {name}, which is no derivative here; there are {', '.join(values)}")
-    symbols: dict[str, Any] = {name: ca.SX.sym(name) for name in (*BALANCED, *values)}
-    here = air_at(atmosphere, altitude)
-    air = ConstantAtmosphere(float(here.temperature), float(here.pressure))
-    dynamics = build_dynamics(vehicle, replace(aerodynamics, **symbols), air, FlatEarth(gravity))
-    given = {"speed": speed, "altitude": altitude, "path_angle": path_angle, **values}
-    steady = trim(dynamics, unknown=BALANCED, given=given)
-    linear = linear_flight(steady, outputs=("load_factor",))
+    linear = balanced_flight(
+        vehicle,
+        aerodynamics,
+        speed,
+        atmosphere=atmosphere,
+        altitude=altitude,
+        path_angle=path_angle,
+        gravity=gravity,
+    )
     modes = aircraft_modes(linear)
     n_alpha = float(linear.c[0, linear.states.index("alpha")])
     slopes = matrix_derivatives(linear, tuple(values))
-    closed = classical_modes(vehicle, aerodynamics, float(here.density), speed, gravity)
+    closed = classical_modes(vehicle, aerodynamics, float(air_at(atmosphere, altitude).density), speed, gravity)
     made = [
         ModeDamping(mode, _fit(linear, mode), closed.get(mode.name), gradient, values, errors)
         for mode, gradient in ((m, dict(zip(values, _gradient(linear.a, m, slopes), strict=True))) for m in modes.modes)
     ]
     qualities = rate_modes(aircraft_class, category, modes, n_alpha=n_alpha if n_alpha > 0.0 else None)
-    return AircraftDamping(steady, linear, modes, tuple(made), qualities)
+    return AircraftDamping(linear.trim, linear, modes, tuple(made), qualities)
+
+
+def balanced_flight(
+    vehicle: Vehicle,
+    aerodynamics: BodyAxisAerodynamics,
+    speed: float,
+    *,
+    atmosphere: Atmosphere,
+    altitude: float = 0.0,
+    path_angle: float = 0.0,
+    gravity: float = FlatEarth().g,
+) -> LinearFlight:
+    """Linear model of an aircraft, given by derivatives in stability axes, about the steady flight that they are of.
+
+    CX_0, CZ_0 and Cm_0 are what that flight at no incidence needs; they and the derivatives are parameters of the
+    model. The air is held as it is at the altitude. Parameters as `aircraft_damping`.
+    """
+    values = _derivatives(aerodynamics)
+    symbols: dict[str, Any] = {name: ca.SX.sym(name) for name in (*BALANCED, *values)}
+    here = air_at(atmosphere, altitude)
+    air = ConstantAtmosphere(float(here.temperature), float(here.pressure))
+    dynamics = build_dynamics(vehicle, replace(aerodynamics, **symbols), air, FlatEarth(gravity))
+    given = {"speed": speed, "altitude": altitude, "path_angle": path_angle, **values}
+    return linear_flight(trim(dynamics, unknown=BALANCED, given=given), outputs=("load_factor",))
 
 
 def _derivatives(aerodynamics: BodyAxisAerodynamics) -> dict[str, float]:

@@ -200,11 +200,19 @@ def missile_mode_sweep(
         [rad/s].
     atmosphere : Atmosphere, optional
         The standard one if not given.
+
+    Raises
+    ------
+    InputError
+        If no point is within the model's `validity`; points that are not are left out, with the reason.
     """
     air = StandardAtmosphere() if atmosphere is None else atmosphere
     dynamics = build_dynamics(vehicle, aerodynamics, air, FlatEarth(0.0))
 
     def modes_at(mach: float, altitude: float) -> Modes:
+        reach = aerodynamics.validity
+        if not reach.mach_min <= mach <= reach.mach_max:
+            raise InputError(f"the model holds from Mach {reach.mach_min:g} to {reach.mach_max:g}, not at {mach:g}")
         speed = mach * float(air_at(air, altitude).speed_of_sound)
         return missile_modes(dynamics, speed, roll_rate=roll_rate, altitude=altitude)
 

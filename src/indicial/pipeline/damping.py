@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from indicial.case import read_aircraft
+from indicial.case import AircraftFile, read_aircraft
 from indicial.errors import InputError
 from indicial.flightsim import (
     AircraftDamping,
     Atmosphere,
+    BodyAxisAerodynamics,
     ConstantAtmosphere,
     MissileDamping,
+    Modes,
+    ModeSweep,
     StandardAtmosphere,
     air_at,
     aircraft_damping,
+    aircraft_modes,
+    balanced_flight,
     missile_damping,
+    sweep_modes,
 )
 from indicial.flightsim.atmosphere import GAS_CONSTANT
 from indicial.flightsim.damping_sensitivity import NAMES
@@ -81,7 +89,8 @@ def damping_of_aircraft(
     ----------
     path : path
     mach, altitude : float, optional
-        Instead of the file's Mach number and air; the derivatives stay, and the loads are balanced anew.
+        Instead of the file's Mach number and air; the loads are balanced anew, and the derivatives stay, but for
+        ``CX_alpha = CL - CD_alpha``, which is taken in proportion to the lift coefficient (a parabolic polar).
 
     Raises
     ------
@@ -98,7 +107,7 @@ def damping_of_aircraft(
         speed = number * float(air_at(air, height).speed_of_sound)
     return aircraft_damping(
         file.vehicle,
-        file.aerodynamics(speed),
+        _moved(file, speed, float(air_at(air, height).density)),
         speed,
         atmosphere=air,
         aircraft_class=file.aircraft_class,
@@ -108,6 +117,32 @@ def damping_of_aircraft(
         gravity=here.gravity_m_s2,
         uncertainties=file.uncertainties,
     )
+
+
+def sweep_of_aircraft(path: str | Path, machs: Sequence[float], altitudes: Sequence[float]) -> ModeSweep:
+    """Modes of an aircraft file over Mach number and altitude [m] in the standard atmosphere.
+
+    What changes with the condition is as in `damping_of_aircraft`.
+    """
+    file = read_aircraft(path)
+    air = StandardAtmosphere()
+
+    def modes_at(mach: float, altitude: float) -> Modes:
+        here = air_at(air, altitude)
+        speed = mach * float(here.speed_of_sound)
+        loads = _moved(file, speed, float(here.density))
+        flown = {"path_angle": math.radians(file.condition.path_angle_deg), "gravity": file.condition.gravity_m_s2}
+        return aircraft_modes(balanced_flight(file.vehicle, loads, speed, atmosphere=air, altitude=altitude, **flown))
+
+    return sweep_modes(modes_at, machs, altitudes)
+
+
+def _moved(file: AircraftFile, speed: float, density: float) -> BodyAxisAerodynamics:
+    """The file's derivatives at another dynamic pressure."""
+    here = file.condition
+    lift = here.density_kg_m3 * here.speed_m_s**2 / (density * speed**2)
+    loads = file.aerodynamics(speed)
+    return replace(loads, CX_alpha=lift * loads.CX_alpha)
 
 
 def _positive(mach: float) -> float:
