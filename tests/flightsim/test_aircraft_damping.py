@@ -147,6 +147,20 @@ def test_the_classical_spiral_is_the_last_two_coefficients_of_the_quartic(boeing
     assert closed.real == pytest.approx(-e / d, rel=0.03)
 
 
+@pytest.mark.parametrize("lag", [5.896, 0.0, -20.0])
+def test_n_alpha_is_that_of_a_steady_pull_up(boeing: AircraftDamping, lag: float) -> None:
+    """Its path turns at q = g n/V, and lift of incidence and of pitching make the load factor; alphadot has no part."""
+    vehicle = boeing.steady.dynamics.vehicle
+    model = replace(read_aircraft(str(find_aircraft("boeing_747"))).aerodynamics(), CZ_alphadot=lag)
+    found = aircraft_damping(
+        vehicle, model, SPEED, atmosphere=AIR, aircraft_class="III", category="B", gravity=GRAVITY
+    ).qualities["short-period frequency"]
+    n_alpha = float(found.value.partition("n/alpha ")[2].split()[0])
+    lift = vehicle.mass * GRAVITY / (0.5 * DENSITY * SPEED**2 * vehicle.reference.area)
+    by_pitching = 5.921 * vehicle.reference.length * GRAVITY / (2.0 * SPEED**2)  # CL for one g of pull-up
+    assert n_alpha == pytest.approx(4.92 / (lift - by_pitching), rel=2e-4)
+
+
 def test_modes_that_no_requirement_is_of_are_told() -> None:
     modes = [Mode("short period", -1 + 2j, 50.0), Mode("roll-spiral", -1 + 1j, 50.0), Mode("lag 1", -9, 50.0)]
     rated = rate_modes("I", "B", Modes(tuple(modes), 50.0, 0.0), n_alpha=10.0)

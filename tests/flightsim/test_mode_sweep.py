@@ -147,7 +147,7 @@ def test_damping_over_k_solves_the_eigenproblem_with_h_of_s() -> None:
     for k, value in zip((0.002, 0.01, 0.05), found.lagging, strict=True):
         inertia = FINNER.inertia[1, 1] * (found.k_here / k) ** 2
         root = nonlinear_root(model, inertia, value / SPEED * (1.0 + 1e-4))
-        assert value / SPEED == pytest.approx(root, rel=1e-9)
+        assert value / SPEED == pytest.approx(root, rel=1e-12)
 
 
 def test_lag_modes_of_a_missile_that_pass_one_another_keep_their_names() -> None:

@@ -156,6 +156,12 @@ class AircraftDamping:
             size = max(abs(one.mode.damping), max(map(abs, one.parts.values()), default=0.0))
             told = [f"{name} {part:+.3g}" for name, part in one.parts.items() if abs(part) > _SMALL_PART * size]
             lines.append(f"  {one.mode.name:<14}{', '.join(told)}")
+        lines.append("  and what the damping ratio changes with, for a tenth more of each derivative:")
+        for one in self.modes:
+            if one.mode.frequency:
+                steps = {name: 0.1 * one.values[name] * slope for name, slope in one.ratio_gradient.items()}
+                told = sorted((name for name in steps if abs(steps[name]) > 1e-4), key=lambda name: -abs(steps[name]))
+                lines.append(f"  {one.mode.name:<14}{', '.join(f'{name} {steps[name]:+.2g}' for name in told)}")
         return "\n".join([*lines, self.qualities.summary()])
 
     def to_dict(self) -> dict[str, Any]:
@@ -254,7 +260,7 @@ def aircraft_damping(
         gravity=gravity,
     )
     modes = aircraft_modes(linear)
-    n_alpha = float(linear.c[0, linear.states.index("alpha")])
+    n_alpha = _steady_n_alpha(linear)
     slopes = matrix_derivatives(linear, tuple(values))
     closed = classical_modes(vehicle, aerodynamics, float(air_at(atmosphere, altitude).density), speed, gravity)
     made = [
@@ -287,6 +293,13 @@ def balanced_flight(
     dynamics = build_dynamics(vehicle, replace(aerodynamics, **symbols), air, FlatEarth(gravity))
     given = {"speed": speed, "altitude": altitude, "path_angle": path_angle, **values}
     return linear_flight(trim(dynamics, unknown=BALANCED, given=given), outputs=("load_factor",))
+
+
+def _steady_n_alpha(linear: LinearFlight) -> float:
+    """Load factor per angle of attack [g/rad] in a steady pull-up at constant speed, as MIL-F-8785C defines n/alpha."""
+    alpha, q = (linear.states.index(name) for name in ("alpha", "q"))
+    turning = -linear.a[alpha, alpha] / linear.a[alpha, q]  # q per alpha that keeps alpha
+    return float(linear.c[0, alpha] + linear.c[0, q] * turning)
 
 
 def _derivatives(aerodynamics: BodyAxisAerodynamics) -> dict[str, float]:

@@ -126,7 +126,8 @@ class ModeSweep:
                 axes[0].plot(value.real, value.imag, ".-", label=label, **style)
                 axes[0].plot(value.real[:1], value.imag[:1], "o", markerfacecolor="none", **style)
                 axes[1].plot(self.machs, np.abs(value), ".-", **style)
-                axes[2].plot(self.machs, -value.real / np.abs(value), ".-", **style)
+                if np.any(value.imag):  # the ratio of a real mode is 1, and tells nothing
+                    axes[2].plot(self.machs, -value.real / np.abs(value), ".-", **style)
         axes[0].axvline(0.0, color="0.6", linewidth=0.8)
         axes[0].set(xlabel="real part [1/s]", ylabel="imaginary part [rad/s]", title="eigenvalues (ring: lowest Mach)")
         axes[1].set(xlabel="Mach number", ylabel="natural frequency [rad/s]", yscale="log")
