@@ -34,7 +34,7 @@ def test_of_a_well_determined_derivative_it_is_the_bound_too():
     assert np.all(found.statistic >= 0.0)
 
 
-LAG, UNKNOWN = (0.5, -0.15, 0.3), [*(Parameter(n, v) for n, v in TRUTH.items())]
+LAG, UNKNOWN = (0.9, -0.27, 0.3), [*(Parameter(n, v) for n, v in TRUTH.items())]
 
 
 def lag_fit(seed):

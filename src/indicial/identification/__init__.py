@@ -2,6 +2,7 @@
 
 from indicial.identification.accuracy import Whiteness
 from indicial.identification.coefficients import aerodynamic_coefficient, polynomial_terms, regressor
+from indicial.identification.compatibility import Compatibility, check_compatibility
 from indicial.identification.differentiation import differentiate
 from indicial.identification.equation_error import EquationError, equation_error
 from indicial.identification.estimate import Estimate
@@ -26,10 +27,13 @@ from indicial.identification.reading import read_flight_record
 from indicial.identification.record import CHANNEL_UNITS, FlightRecord
 from indicial.identification.sensitivity import SensitivityModel
 from indicial.identification.state_model import Process, StateModel, state_model
+from indicial.identification.structure import Structure, model_structure
+from indicial.identification.to_centre_of_gravity import to_centre_of_gravity
 
 __all__ = [
     "CHANNEL_UNITS",
     "FREE_FLIGHT",
+    "Compatibility",
     "Consistency",
     "EquationError",
     "Estimate",
@@ -55,9 +59,11 @@ __all__ = [
     "SensitivityModel",
     "Sensor",
     "StateModel",
+    "Structure",
     "Verdict",
     "Whiteness",
     "aerodynamic_coefficient",
+    "check_compatibility",
     "differentiate",
     "equation_error",
     "filter_error",
@@ -71,6 +77,7 @@ __all__ = [
     "linear_theory",
     "measure",
     "measure_flight",
+    "model_structure",
     "multisines",
     "polynomial",
     "polynomial_terms",
@@ -83,4 +90,5 @@ __all__ = [
     "relative_peak_factor",
     "spline",
     "state_model",
+    "to_centre_of_gravity",
 ]
