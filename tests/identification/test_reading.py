@@ -112,3 +112,13 @@ def test_damaged_tables_are_refused(files, table, message):
     path, _ = files(table)
     with pytest.raises(InputError, match=message):
         read_flight_record(path, {"time": "t", "channels": {"q": "q"}})
+
+
+def test_a_roll_angle_that_counts_turns_is_read_where_its_unit_is_stated(tmp_path):
+    rows = "\n".join(f"{0.1 * i:.1f},{90.0 * i:.1f}" for i in range(20))
+    (tmp_path / "roll.csv").write_text(f"t,roll\n{rows}\n")
+    stated = {"time": "t", "channels": {"phi": {"column": "roll", "unit": "deg"}}}
+    record = read_flight_record(tmp_path / "roll.csv", stated)
+    assert record["phi"][-1] == pytest.approx(math.radians(19 * 90.0))
+    with pytest.raises(InputError, match="more than is plausible"):
+        read_flight_record(tmp_path / "roll.csv", {"time": "t", "channels": {"phi": "roll"}})

@@ -42,6 +42,7 @@ _SETTLED = 5e-3
 _MOST_DAMPING = 1e9
 _DIFFERENCE = 1e-5
 _BLOCKS = 30
+_MOVING = 3.0  # standard deviations
 
 
 @dataclass(frozen=True)
@@ -144,7 +145,7 @@ def check_compatibility(
         `OUTPUTS`.
     errors : sequence of str, optional
         What to look for: ``bias_``, ``scale_`` or ``delay_`` and a channel (delays of `OUTPUTS` only); `DEFAULT` as far
-        as the record has the channels, if not given.
+        as the record has the channels, if not given; of scales those of channels that move beyond their noise.
     g : float
         [m/s^2].
 
@@ -165,15 +166,17 @@ def check_compatibility(
     place = record.provenance.get("installation", {})
     if any(place.get("accelerometers", ())) or any(place.get("vanes", ())):
         raise InputError("the instruments are off the centre of gravity: move them there by to_centre_of_gravity first")
-    wanted = _wanted(errors, seen)
+    wanted = _wanted(errors, seen, record)
     _check_units(record, g)
     with threadpool_limits(limits=1, user_api="blas"):
         return _Fit(record, seen, wanted, g).solve()
 
 
-def _wanted(errors: Sequence[str] | None, seen: tuple[str, ...]) -> tuple[str, ...]:
+def _wanted(errors: Sequence[str] | None, seen: tuple[str, ...], record: FlightRecord) -> tuple[str, ...]:
+    """What to look for; of scales, unless asked for, only those of channels that move far beyond their noise."""
     if errors is None:
-        return tuple(name for name in DEFAULT if name.split("_")[1] in (*IMU, *seen))
+        found = [name for name in DEFAULT if name.split("_")[1] in (*IMU, *seen)]
+        return tuple(n for n in found if not n.startswith("scale_") or _moves(record, n.removeprefix("scale_")))
     for name in errors:
         kind, _, channel = name.partition("_")
         allowed = seen if kind == "delay" else (*IMU, *seen)
@@ -392,6 +395,12 @@ def _late(time: Array, values: Array, delay: float) -> Array:
 
     made: Array = CubicSpline(time, values)(np.maximum(time - delay, time[0]))
     return made
+
+
+def _moves(record: FlightRecord, name: str) -> bool:
+    values = record[name]
+    sd = record.standard_deviations.get(name) or _roughness(values)
+    return float(np.nanstd(values)) > _MOVING * sd
 
 
 def _roughness(values: Array) -> float:

@@ -62,6 +62,9 @@ _FACTORS: Mapping[str, Mapping[str, float]] = {
 _INPUT_FACTORS = {**_FACTORS["1"], **_FACTORS["rad"], "N": 1.0, "kN": 1e3}
 
 _LARGEST = {"rad": 2.0 * math.pi, "m/s^2": 2000.0, "V": 15e3, "mach": 50.0, "alpha": math.pi, "beta": math.pi / 2.0}
+_TURNING = ("phi", "psi")
+"""Angles that may count turns: of any size where the map states their unit."""
+
 _LARGEST_RATE = 60.0  # rad/s, of q and r; a missile may roll faster
 
 
@@ -110,7 +113,8 @@ def read_flight_record(path: str | Path, columns: Mapping[str, Any] | str | Path
     for channel, column in chosen.channels.items():
         check_channel(channel)
         values = _values(channel, column, _FACTORS[CHANNEL_UNITS[channel]], table, name)
-        check_size(channel, values, str(path))
+        if channel not in _TURNING or isinstance(column, str) or column.unit is None:
+            check_size(channel, values, str(path))
         channels[channel] = _shifted(time, values, column)
     inputs = {
         given: _shifted(time, _values(given, column, _INPUT_FACTORS, table, name), column)
