@@ -242,6 +242,23 @@ def test_dropouts_outliers_and_a_bias():
     assert "Cm_q" in found.summary()
 
 
+def test_wrong_units_and_signs_are_told():
+    record = simulated(5)
+    in_g = fit_manoeuvres([manoeuvre(record.with_channels(az=record["az"] / 9.80665))], parameters())
+    (told,) = [text for text in in_g.suspicious() if "times the stated" in text]
+    assert "channel az" in told
+    assert "multiples of g" in told
+    turned = fit_manoeuvres([manoeuvre(record.with_channels(az=-record["az"]))], parameters())
+    assert any("az" in text and "the other sign" in text for text in turned.suspicious())
+    with pytest.raises(InputError, match=r"alpha reaches .* are they deg"):
+        manoeuvre(record.with_channels(alpha=np.degrees(record["alpha"])))
+    spoilt = record["q"].copy()
+    spoilt[::25] += 0.5
+    outliers = fit_manoeuvres([manoeuvre(record.with_channels(q=spoilt))], parameters())
+    assert any("channel q: 10 suspicious residuals" in text for text in outliers.suspicious())
+    assert abs(outliers["Cm_q"].value - TRUTH["Cm_q"]) < 4.0 * outliers["Cm_q"].standard_error
+
+
 def test_what_cannot_be_fitted_is_refused_in_words():
     record = simulated(5)
     with pytest.raises(InputError, match="Cm_q of record is neither known nor unknown"):

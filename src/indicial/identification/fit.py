@@ -19,6 +19,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _SURE = 1.96  # standard errors of a 95% interval
+_LOUD = 5.0  # times the stated noise, from which a channel is told to be suspicious
+_UNITS = {
+    math.degrees(1.0): "degrees",
+    math.radians(1.0): "radians for degrees",
+    1.0 / 9.80665: "multiples of g",
+    9.80665: "multiples of g taken for m/s^2",
+    -1.0: "the other sign",
+    1.0 / 0.3048: "feet",
+    0.3048: "metres for feet",
+}
 _UNSEEN = 0.5  # standard error over the larger of the two values, from which nothing is said of it
 
 
@@ -130,9 +140,11 @@ class OutputErrorFit:
         return matrix
 
     def suspicious(self) -> tuple[str, ...]:
-        """Residuals so large that one among all would be so by chance in a hundred fits, in words.
+        """What looks wrong with the records, in words: outliers, and channels that no model of this form fits.
 
-        Their size is counted in a standard deviation from the median, which outliers do not move.
+        An outlier is a residual so large that one among all would be so by chance in a hundred fits; its size is
+        counted in a standard deviation from the median, which outliers do not move. Noise of five times the stated and
+        more is told, with the unit or sign that would explain it.
         """
         from scipy.special import ndtri
 
@@ -145,7 +157,26 @@ class OutputErrorFit:
             if number:
                 worst = float(np.max(np.abs(white))) / scale
                 found.append(f"channel {channel}: {number} suspicious residuals, up to {worst:.1f} standard deviations")
+            if self.noise[channel] > _LOUD:
+                guess = self._guess(channel)
+                found.append(f"channel {channel}: residuals of {self.noise[channel]:.3g} times the stated noise{guess}")
         return tuple(found)
+
+    def _guess(self, channel: str) -> str:
+        """A unit or sign by which what was measured is a multiple of what was fitted."""
+        measured, fitted = [], []
+        for m, residuals in zip(self.manoeuvres, self.residuals, strict=True):
+            if channel in m.model.channels:
+                i = m.model.channels.index(channel)
+                known = np.isfinite(residuals[:, i])
+                measured.append(m.measured[known, i])
+                fitted.append(m.measured[known, i] - residuals[known, i])
+        seen, made = np.concatenate(measured), np.concatenate(fitted)
+        slope = float(seen @ made) / float(made @ made) if np.any(made) else 1.0
+        for factor, words in _UNITS.items():
+            if abs(slope / factor - 1.0) < 0.05:
+                return f": it is {slope:.3g} times what the model gives, so {words}?"
+        return ": outliers, or a model that lacks something?"
 
     def against(self, before: Mapping[str, float | tuple[float, float]]) -> tuple[Verdict, ...]:
         """The parameters against values known before: numbers, or pairs of value and standard deviation."""

@@ -272,8 +272,8 @@ def minimise(problem: Problem, point: _Point, noise: Noise, cost: list[float]) -
         if damping > _MAX_DAMPING:
             break
     raise DivergenceError(
-        f"output error did not converge (J {cost[0]:.6g} to {cost[-1]:.6g}): free less, give better start values, or "
-        "divide the record into segments"
+        f"output error did not converge (J {cost[0]:.6g} to {cost[-1]:.6g}): free less, give better start values, "
+        "divide the record into segments, or check units and signs of its channels"
     )
 
 

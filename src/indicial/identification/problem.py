@@ -14,6 +14,7 @@ from indicial.flightsim import Dynamics, InitialState, Signal
 from indicial.flightsim.march import Drive
 from indicial.flightsim.signals import Schedule
 from indicial.identification.measurement import RangeRecord
+from indicial.identification.reading import check_size
 from indicial.identification.record import FlightRecord
 from indicial.identification.sensitivity import BIAS, Integers, Marched, SensitivityModel
 from indicial.identification.start_state import StartState
@@ -132,10 +133,13 @@ class Manoeuvre:
         Raises
         ------
         InputError
-            If a channel is missing or dead, or a number makes no sense.
+            If a channel is missing or dead, or a number makes no sense, as degrees for radians do not.
         """
         seen = tuple(record.channels) if channels is None else tuple(channels)
         record.require(*seen)
+        for channel in seen:
+            if channel not in ("phi", "psi"):
+                check_size(channel, record[channel], name)
         if segments < 1 or steps_per_interval < 1:
             raise InputError("segments and steps_per_interval must be at least 1")
         built = SensitivityModel.of(dynamics, seen, biases) if model is None else model
