@@ -144,6 +144,16 @@ def test_a_designed_control_tells_more_than_the_one_it_began_with_and_stays_with
     assert len(designed.plot().axes) == 1 + len(NOISE)
 
 
+def test_a_start_that_breaks_a_limit_between_the_samples_is_not_what_is_designed():
+    # the pulse stands between the middles of the two steps, so the sampled start is no motion at all
+    pulse = Signal.pieces(np.array([0.0, 4.5, 5.5, 10.0]), np.array([0.0, -0.3, 0.0]), 0.0, 0.0)
+    limits = {"alpha": (-0.08, 0.25)}
+    assert np.max(experiment().judge({"elevator": pulse}).outputs["alpha"]) > limits["alpha"][1]
+    designed = improve_input(experiment(), "elevator", pulse, 0.002, steps=2, limits=limits)
+    assert np.max(designed.outputs["alpha"]) <= limits["alpha"][1]
+    assert np.max(np.abs(designed.inputs["elevator"].value)) <= 0.002
+
+
 def test_what_makes_no_sense_is_refused():
     with pytest.raises(InputError, match="no control 'rudder'"):
         experiment().judge({"rudder": 0.1})

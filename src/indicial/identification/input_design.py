@@ -261,7 +261,9 @@ def improve_input(
     values = start.at(0.5 * (edges[1:] + edges[:-1]))
 
     def promise(levels: Array) -> Promise | None:
-        found = judge.promise({**others, control: Signal.pieces(edges, levels, levels[0], levels[-1])})
+        return within(judge.promise({**others, control: Signal.pieces(edges, levels, levels[0], levels[-1])}))
+
+    def within(found: Promise) -> Promise | None:
         inside = all(
             low <= float(np.min(found.outputs[n])) and float(np.max(found.outputs[n])) <= high
             for n, (low, high) in bounds.items()
@@ -272,8 +274,8 @@ def improve_input(
     if first is None:
         raise InputError("the input to start from breaks a limit: begin with a smaller one")
     best = first
-    # an input of steps may tell less than the one it was sampled from, which then is the one to beat
-    whole = judge.promise({**others, control: start})
+    # an input of steps may tell less than the one it was sampled from, which then is to beat if it may be flown
+    whole = within(judge.promise({**others, control: start}))
     for turn in range(_ROUNDS):
         before = best.log_determinant
         for i in range(steps):
@@ -289,7 +291,7 @@ def improve_input(
                 progress((turn + (i + 1) / steps) / _ROUNDS)
         if best.log_determinant > before - _BETTER:
             break
-    return best if best.log_determinant < whole.log_determinant else whole
+    return best if whole is None or best.log_determinant < whole.log_determinant else whole
 
 
 class _Judge:
