@@ -3,8 +3,9 @@
 A rectangular wing of aspect ratio 6 at 5 degrees heaves at k = 0.314: the same panels, steps and prescribed wake in
 both, 100 steps to a period. Times are processor times of all threads, of the marches alone, without compilation.
 Lift is compared over the last period, by its mean and its first harmonic: the peer takes velocities and changes of
-circulation as differences from the step before, so its lift comes about a step late. The plot goes to
-benchmarks/out/lattice.png. Ptera Software is looked for in PTERA_PYTHON.
+circulation as differences from the step before, so its lift comes about a step late. Beside that, a forced roll of the
+Bocian glider, wing and tail with section data. The plot goes to benchmarks/out/lattice.png. Ptera Software is looked
+for in PTERA_PYTHON.
 """
 
 from __future__ import annotations
@@ -24,6 +25,9 @@ from indicial.cfd.lattice import Lattice, LatticeSettings, LatticeSolver
 from indicial.cfd.shapes import LiftingSurface
 from indicial.conventions import Array
 from indicial.motion import FlightCondition, Motion
+from indicial.studies.bocian.computing import force
+from indicial.studies.bocian.glider import TRIPPED, solver
+from indicial.studies.bocian.pieces import FORCED
 
 CHORD, SPAN, ALPHA, PERIOD_CHORDS = 1.0, 6.0, math.radians(5.0), 10.0
 AMPLITUDE = 0.1
@@ -33,6 +37,7 @@ PANELS = ((4, 5), (6, 10), (10, 20), (14, 30))
 STEPS = (75, 150, 300, 600)
 PEER_STEPS = (100, 300)
 CONDITION = FlightCondition(0.1, alpha=ALPHA)
+GLIDER_PANELS = (8, 20)
 
 
 @dataclass(frozen=True)
@@ -60,8 +65,10 @@ def measure() -> list[Figure]:
     by_steps = [_march(10, 20, steps)[0] for steps in STEPS]
     panels = np.array([2.0 * m * n for m, n in PANELS])
     whole, lift = _march(10, 20, PERIODS * STEPS_PER_PERIOD)
+    glider, glider_panels = _forced_roll()
     figures = [
         Figure.at_most("400 panels, 300 steps", whole, 10.0, "s"),
+        Figure.at_most(f"glider with sections, {glider_panels} panels, 300 steps, all cores", glider, 10.0, "s"),
         Figure("exponent of the number of panels, 60 steps", _exponent(panels[1:], by_panels[1:]), ""),
         Figure("exponent of the number of steps, 400 panels", _exponent(STEPS, by_steps), ""),
     ]
@@ -98,6 +105,14 @@ def _march(chordwise: int, spanwise: int, steps: int) -> tuple[float, Array]:
     return seconds, history["CN"] * math.cos(ALPHA) - history["CA"] * math.sin(ALPHA)
 
 
+def _forced_roll() -> tuple[float, int]:
+    """Time [s] by the clock of a forced roll of the glider at 4 degrees, reductions and all, and its panels."""
+    one = solver({"panels": GLIDER_PANELS, "polars": TRIPPED})
+    start = time.perf_counter()
+    force(one, 4.0, {**FORCED, "periods": PERIODS, "steps_per_period": STEPS_PER_PERIOD})
+    return time.perf_counter() - start, one.lattice.n_panels
+
+
 def _case(steps: int) -> dict[str, Any]:
     """The same for the peer."""
     speed = CONDITION.speed
@@ -132,10 +147,10 @@ def _draw(panels: Array, by_panels: list[float], by_steps: list[float], theirs: 
     import matplotlib.pyplot as plt
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(9.0, 3.6), layout="constrained")
-    left.loglog(panels, by_panels, "o-", label="this lattice, 60 steps")
-    right.loglog(STEPS, by_steps, "o-", label="this lattice, 400 panels")
+    _fitted(left, panels, by_panels, "C0o", "this lattice, 60 steps", first=1)
+    _fitted(right, STEPS, by_steps, "C0o", "this lattice, 400 panels")
     if theirs:
-        right.loglog(PEER_STEPS, theirs, "s--", label="Ptera Software, 400 panels")
+        _fitted(right, PEER_STEPS, theirs, "C1s", "Ptera Software, 400 panels")
     left.set(xlabel="panels", ylabel="processor time [s]")
     right.set(xlabel="steps", ylabel="processor time [s]")
     for axes, places in ((left, panels), (right, np.array(STEPS))):
@@ -147,3 +162,11 @@ def _draw(panels: Array, by_panels: list[float], by_steps: list[float], theirs: 
     folder.mkdir(exist_ok=True)
     figure.savefig(folder / "lattice.png", dpi=150)
     plt.close(figure)
+
+
+def _fitted(axes: Any, sizes: ArrayLike, seconds: list[float], style: str, label: str, first: int = 0) -> None:
+    """Times, and the power of the size that is fitted to those from `first` on."""
+    n, t = np.asarray(sizes, dtype=float), np.asarray(seconds)
+    power, factor = np.polyfit(np.log(n[first:]), np.log(t[first:]), 1)
+    axes.loglog(n, t, style, label=label)
+    axes.loglog(n[first:], np.exp(factor) * n[first:] ** power, f"{style[:2]}--", label=f"fit, power {power:.2f}")

@@ -327,9 +327,9 @@ class RollOscillation(Motion):
     A body at incidence that only rolls turns alpha into sideslip: of the velocity V_z across it at zero roll it keeps
     ``V_z cos phi`` as w and gets ``V_z sin phi`` as v. A translation in step with the roll compensates for that:
 
-    - "full": V_b stays as it is, hence alpha and beta do (a translation by ``V_z sin phi``, ``V_z (1 - cos phi)``);
-    - "sideslip": v = 0, hence beta = 0 to round-off, and ``w = V_z cos phi`` (by ``V_z sin phi cos phi``,
-      ``V_z sin^2 phi``, as a dynamic mesh usually has it);
+    - "full": V_b stays as it is, hence alpha and beta do (a translation by ``-V_z sin phi``, ``-V_z (1 - cos phi)``);
+    - "sideslip": v = 0, hence beta = 0 to round-off, and ``w = V_z cos phi`` (by ``-V_z sin phi cos phi``,
+      ``-V_z sin^2 phi``, as a dynamic mesh usually has it, there with V_z of the oncoming wind and no sign);
     - "none": roll alone.
 
     The translations are components of the reference point's velocity along y and z of the axes at zero roll.

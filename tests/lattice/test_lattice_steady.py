@@ -193,3 +193,19 @@ def _round(
     sheet_velocity(rings.nodes, rings.strength, rings.tail, rings.far, 0.0, np.ascontiguousarray(points.T), velocity)
     tangent = np.stack([-radius * np.sin(theta), 0.6 * radius * np.cos(theta)])
     return -float(np.mean(np.sum(velocity[[0, 2]] * tangent, axis=0)) * 2.0 * math.pi)
+
+
+@pytest.mark.parametrize("kind", ["q", "r"])
+def test_steady_turn_does_not_fly_into_its_own_wake(kind: str) -> None:
+    # radius of 5 spans and less: a wake followed all round would come back to the wing
+    wing = LiftingSurface.wing("wing", 10.0, 1.5, taper=0.5, sweep=0.4)
+    lattice = Lattice.of(wing, chordwise=2, spanwise=6)
+    solver = LatticeSolver(lattice, wing.reference((0.5, 0.0, 0.0)), INCOMPRESSIBLE)
+    condition = FlightCondition(0.1, alpha=0.1)
+    slopes = []
+    for per_metre in (1e-4, 0.02, 0.03):
+        rate = per_metre * condition.speed
+        two, one = (solver.steady(condition, Rates(**{kind: sign * rate})).coefficients for sign in (1.0, -1.0))
+        slopes.append((two - one) / (2.0 * per_metre))
+    load = {"q": 2, "r": 3}[kind]
+    assert [slope[load] / slopes[0][load] for slope in slopes[1:]] == pytest.approx([1.0, 1.0], abs=0.02)

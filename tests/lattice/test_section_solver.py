@@ -6,9 +6,18 @@ import warnings
 import numpy as np
 import pytest
 
-from indicial.cfd.lattice import ExtrapolationWarning, Lattice, LatticeSolver, PolarTables, SectionLatticeSolver
+from indicial.cfd.lattice import (
+    ExtrapolationWarning,
+    Lattice,
+    LatticeSolver,
+    PolarTables,
+    SectionLatticeSolver,
+    SectionSettings,
+    steady_instant,
+)
 from indicial.cfd.lattice.coupling import StripProblem
 from indicial.cfd.lattice.polars import Polar
+from indicial.cfd.lattice.spanwise import spanwise_mean
 from indicial.cfd.shapes import LiftingSurface
 from indicial.errors import InputError
 from indicial.methods import indicial_response, moving_frame
@@ -44,6 +53,20 @@ def test_march_with_a_section_of_slope_two_pi_is_that_of_the_lattice() -> None:
         found, exact = one.unsteady(CONDITION, motion, times), attached(one).unsteady(CONDITION, motion, times)
         np.testing.assert_allclose(found.coefficients, exact.coefficients, atol=1e-7)
         np.testing.assert_allclose(found.before, exact.before, atol=1e-8)
+
+
+@pytest.mark.parametrize("mach", [0.1, 0.6])
+def test_strips_of_a_long_swept_wing_meet_the_incidence_of_flight_at_any_mach_number(mach: float) -> None:
+    # in two dimensions across the sweep nothing is induced: Gamma = pi c cos V alpha/sqrt(1 - M^2 cos^2)
+    wing = LiftingSurface.wing("wing", 400.0, 1.0, sweep=0.6)
+    lattice = Lattice.of(wing, chordwise=4, spanwise=16, camber=False)
+    plain = LatticeSolver(lattice, wing.reference((0.0, 0.0, 0.0)))
+    condition = FlightCondition(mach, alpha=0.01)
+    motion = plain.motion(condition.velocity, np.zeros(3))
+    problem = StripProblem.at(steady_instant(plain.influence(condition), motion))
+    met = problem.incidence(problem.free / (2.0 * np.pi * problem.size))
+    # a quarter of the way out, far from tip and kink
+    np.testing.assert_allclose(met[20:24], 0.01, rtol=5e-3)
 
 
 def lifting_line(slope: float, span: float, root: float, taper: float, terms: int = 60) -> float:
@@ -185,3 +208,77 @@ def test_camber_and_missing_data_are_refused() -> None:
     )
     with pytest.raises(InputError, match="section 'flat' has no polar data"):
         one.steady(CONDITION)
+
+
+def spreading(polar: Polar, spread: float, *, aspect: float = 8.0, spanwise: int = 8) -> SectionLatticeSolver:
+    wing = LiftingSurface.wing("wing", aspect, 1.2, taper=2.0 / 3.0)
+    lattice = Lattice.of(wing, chordwise=2, spanwise=spanwise, camber=False)
+    reference = wing.reference((0.3, 0.0, 0.0))
+    return SectionLatticeSolver(lattice, reference, tables(polar), SectionSettings(spread=spread))
+
+
+def test_spanwise_mean_keeps_what_is_linear_across_the_span_and_surfaces_apart() -> None:
+    wing = LiftingSurface.wing("wing", 12.0, 1.0)
+    tail = LiftingSurface.wing("tail", 4.0, 0.5, root_leading_edge=(5.0, 0.0))
+    strips = Lattice.of([wing, tail], chordwise=1, spanwise=40, span_spacing="equal").strips
+    mean = spanwise_mean(strips, 0.7)
+    assert mean is not None
+    np.testing.assert_allclose(np.sum(mean, axis=1), 1.0, atol=1e-14)
+    y = strips.quarter_chord[:, 1]
+    np.testing.assert_allclose((mean @ y)[20:60], y[20:60], atol=1e-10)
+    assert not np.any(mean[:80, 80:])
+    # the transform of the Gaussian: a wave of length L chords is damped by exp(-(pi spread/L)^2)
+    wave = np.cos(2.0 * np.pi * y / 2.0)
+    middle = slice(35, 45)
+    np.testing.assert_allclose((mean @ wave)[middle], math.exp(-((math.pi * 0.7 / 2.0) ** 2)) * wave[middle], atol=1e-4)
+
+
+def test_spread_leaves_attached_flow_as_it_is() -> None:
+    rates = Rates(0.5, 0.3, 0.2)
+    plain, spread = (spreading(linear(5.5), width).steady(CONDITION, rates) for width in (0.0, 1.0))
+    np.testing.assert_allclose(spread.coefficients, plain.coefficients, atol=1e-9)
+
+
+def test_spread_state_has_the_lift_of_the_points_that_the_means_ask_for_and_stays() -> None:
+    one = spreading(stalling(0.4), 1.0)
+    condition = FlightCondition(0.1, alpha=math.radians(16.5))
+    sections = one.sections(condition)
+    problem = StripProblem.at(one._steady_instant(condition, Rates()))
+    state = one.steady_states(condition)[0]
+    point = sections.static(spanwise_mean(one.lattice.strips, 1.0) @ state.alpha)[0]
+    np.testing.assert_allclose(state.point, point, atol=1e-12)
+    wanted = problem.size * np.hypot(problem.along, state.across) * sections.lift(state.alpha, point)[0]
+    np.testing.assert_allclose(state.circulation, wanted, rtol=1e-9)
+    assert np.min(state.point) < 0.9
+    history = one.unsteady(condition, SteadyMotion(condition), np.linspace(0.0, 1.0, 21))
+    np.testing.assert_allclose(history.coefficients, np.tile(history.before, (21, 1)), atol=1e-6)
+
+
+def test_slopes_of_the_settled_lift_are_derivatives() -> None:
+    one = spreading(stalling(), 1.0)
+    sections, h = one.sections(CONDITION), 1e-6
+    alpha = np.radians(np.linspace(9.0, 17.0, 16) + 0.03)
+    slopes = sections.settled_lift(alpha)[1]
+    for n in (3, 8, 12):
+        push = h * (np.arange(16) == n)
+        numeric = (sections.settled_lift(alpha + push)[0] - sections.settled_lift(alpha - push)[0]) / (2.0 * h)
+        np.testing.assert_allclose(slopes[:, n], numeric, atol=1e-5)
+
+
+def test_cells_of_stall_have_the_width_of_strips_unless_separation_spreads() -> None:
+    condition = FlightCondition(0.1, alpha=math.radians(14.5))
+
+    def reversals(spread: float, spanwise: int) -> tuple[int, int]:
+        """How often separation turns from more to less along half a wing, and how many steady states there are."""
+        states = spreading(stalling(0.3), spread, aspect=16.0, spanwise=spanwise).steady_states(condition)
+        change = np.diff(states[0].point[spanwise:])
+        change = change[np.abs(change) > 0.05]
+        return int(np.count_nonzero(np.diff(np.sign(change)))), len(states)
+
+    assert reversals(0.0, 24)[0] > reversals(0.0, 12)[0] > 3
+    assert reversals(1.0, 12) == reversals(1.0, 24) == (0, 1)
+
+
+def test_bad_spread_is_refused() -> None:
+    with pytest.raises(InputError, match="spread is -1"):
+        SectionSettings(spread=-1.0)

@@ -1,8 +1,9 @@
 r"""Section data on a lattice: the circulation of every strip is that of its section at the incidence it meets.
 
 Additional normalwash w, uniform over a strip, turns the lattice's attached flow into that of the section. In two
-dimensions the circulation of a strip is ``2 pi g (v + w)`` with the wind v across its chord, ``g = c cos(Lambda)/(2
-beta)``; so on a wing, where all other strips and all wakes induce their part of v,
+dimensions the circulation of a strip is ``2 pi g (v + w)`` with the wind v across its chord, ``g = c cos(Lambda) /
+(2 sqrt(1 - M^2 cos^2(Lambda)))`` (Prandtl and Glauert across the sweep); so on a wing, where all other strips and all
+wakes induce their part of v,
 
     v = Gamma/(2 pi g) - w,   alpha = atan2(v, u),   Gamma = g sqrt(u^2 + v^2) cl(alpha, x),   Gamma = Gamma_0 + R w
 
@@ -63,7 +64,7 @@ class StripProblem:
             instant.circulation()[lattice.trailing],
             instant.response[lattice.trailing],
             np.sum(instant.strip_wind * lattice.strips.aft, axis=1),
-            lattice.strips.chord * sweep_cosine(lattice) / (2.0 * instant.influence.beta),
+            _size(instant),
         )
 
     def between(self, later: StripProblem, fraction: float) -> StripProblem:
@@ -93,11 +94,15 @@ class StripProblem:
         return circulation / (2.0 * np.pi * self.size) - across
 
     def circulation(self, sections: StripSections, across: Array, point: Array | None) -> tuple[Array, Array]:
-        """Gamma of the sections (S,) and its slope against v; static at None for `point`."""
+        """Gamma of the sections (S,) and its slope against v, (S,) for given points, (S, S) at rest (None)."""
         speed = np.maximum(np.hypot(self.along, across), 1e-12)
         alpha = self.incidence(across)
-        cl, slope = sections.polar_lift(alpha) if point is None else sections.lift(alpha, point)
-        return self.size * speed * cl, self.size * (across / speed * cl + self.along / speed * slope)
+        if point is not None:
+            cl, slope = sections.lift(alpha, point)
+            return self.size * speed * cl, self.size * (across / speed * cl + self.along / speed * slope)
+        cl, slopes = sections.settled_lift(alpha)
+        turned = (self.size * speed)[:, None] * slopes * (self.along / speed**2)
+        return self.size * speed * cl, np.diag(self.size * across / speed * cl) + turned
 
     def solve(
         self, sections: StripSections, across: Array, point: Array | None, tolerance: float = TOLERANCE
@@ -123,7 +128,8 @@ class StripProblem:
             if size <= tolerance * scale:
                 return v, gamma
             try:
-                step = np.linalg.solve(inner * slope + self.response, -off)
+                answer = inner * slope if slope.ndim == 1 else inner @ slope
+                step = np.linalg.solve(answer + self.response, -off)
             except np.linalg.LinAlgError:
                 break
             part = 1.0
@@ -140,6 +146,13 @@ class StripProblem:
         if float(np.max(np.abs(off))) <= 1e3 * TOLERANCE * scale:
             return v, gamma
         raise DivergenceError(f"section lift and lattice do not meet: residual {np.max(np.abs(off)) / scale:.1e}")
+
+
+def _size(instant: Instant) -> Array:
+    """g of the strips (S,) [m]: drawing out by 1/beta along x stretches the chords and lessens the sweep."""
+    cosine = sweep_cosine(instant.influence.lattice)
+    normal_mach2 = (1.0 - instant.influence.beta**2) * cosine**2
+    return np.asarray(0.5 * instant.influence.lattice.strips.chord * cosine / np.sqrt(1.0 - normal_mach2))
 
 
 def sweep_cosine(lattice: Lattice) -> Array:

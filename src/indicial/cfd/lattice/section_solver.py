@@ -19,6 +19,7 @@ from indicial.cfd.lattice.panels import Lattice
 from indicial.cfd.lattice.polars import NeuralFoil, Polar, PolarSource, mixed
 from indicial.cfd.lattice.separation import SeparationLag, SeparationState, StripSections
 from indicial.cfd.lattice.solver import LatticeSettings, LatticeSolver, jump_impulse
+from indicial.cfd.lattice.spanwise import spanwise_mean
 from indicial.cfd.lattice.steady_states import SteadyStrips, distinct, settle, starts
 from indicial.conventions import COEFFICIENTS, Array, ReferenceQuantities
 from indicial.errors import DivergenceError, InputError
@@ -50,10 +51,23 @@ class SectionSettings:
     start : str
         Which steady state motions and `steady` begin from, where there are several: "attached", "separated",
         "left attached" or "right attached".
+    spread : float
+        Chords of span over which the incidence that a separation point answers to is averaged; 0, the default, leaves
+        each strip on its own. See `indicial.cfd.lattice.spanwise`.
+
+    Raises
+    ------
+    InputError
+        If the spread is negative or not finite.
     """
 
     lag: SeparationLag = field(default_factory=SeparationLag)
     start: str = "attached"
+    spread: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.spread) and self.spread >= 0.0):
+            raise InputError(f"spread is {self.spread} chords, must be finite and at least 0")
 
 
 @dataclass(frozen=True)
@@ -146,7 +160,7 @@ class SectionLatticeSolver:
                 if share > 0.0:
                     parts.append((known[key], share))
             polars.append(mixed(parts))
-        return StripSections.of(polars)
+        return StripSections.of(polars, spanwise_mean(strips, self.settings.spread))
 
     def steady_states(
         self, condition: FlightCondition, rates: Rates = Rates(), *, more: Sequence[Array] = ()
@@ -289,6 +303,7 @@ class SectionLatticeSolver:
             "delay": self.settings.lag.delay,
             "response": self.settings.lag.response,
             "start": self.settings.start,
+            "spread": self.settings.spread,
             "extrapolated": outside,
         }
 
@@ -312,7 +327,7 @@ class SectionMarch:
             solver.settings.lag,
         )
         self._across = state.across
-        self.state = SeparationState(state.alpha, state.point)
+        self.state = SeparationState(self._sections.seen(state.alpha), state.point)
         circulation = solver._panels(self._start, self._problem, state.across, state.circulation)
         self.before = solver._coefficients(self._start, circulation, condition, state.across, state.point)
         self._march = March(influence, before, circulation, frozen)

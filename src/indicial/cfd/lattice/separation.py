@@ -62,7 +62,7 @@ class SeparationLag:
 
 @dataclass(frozen=True)
 class SeparationState:
-    """Of each strip: the late incidence alpha' [rad] and the separation point x, shapes (S,)."""
+    """Of each strip: the late incidence alpha' that it sees [rad] and the separation point x, shapes (S,)."""
 
     incidence: Array
     point: Array
@@ -81,15 +81,18 @@ class StripSections:
         shape (4, 2, n, S).
     trusted : ndarray
         Ends of the trusted ranges [rad], shape (2, S).
+    mean : ndarray, optional
+        Weights of all strips in the incidence that each separation point answers to (S, S); its own if not given.
     """
 
     slope: Array
     zero_lift: Array
     tables: Array
     trusted: Array
+    mean: Array | None = None
 
     @classmethod
-    def of(cls, polars: Sequence[Polar]) -> Self:
+    def of(cls, polars: Sequence[Polar], mean: Array | None = None) -> Self:
         """From one polar a strip."""
         full = [polar.full for polar in polars]
         fits = [attached_lift(polar) for polar in polars]
@@ -99,7 +102,11 @@ class StripSections:
         values = np.stack([kirchhoff(points), *loads])
         slopes = np.stack([PchipInterpolator(GRID, one).derivative()(GRID) for one in values])
         trusted = np.array([p.range for p in full]).T
-        return cls(slope, zero, np.stack([values, slopes], axis=1), trusted)
+        return cls(slope, zero, np.stack([values, slopes], axis=1), trusted, mean)
+
+    def seen(self, alpha: Array) -> Array:
+        """Incidences (S,) that the separation points answer to, of those that the strips meet (S,)."""
+        return alpha if self.mean is None else np.asarray(self.mean @ alpha)
 
     def _at(self, alpha: Array, rows: Sequence[int]) -> tuple[Array, Array]:
         """Values and slopes of tables at incidences (S,), shapes (len(rows), S)."""
@@ -133,6 +140,17 @@ class StripSections:
         (lift,), (slope,) = self._at(alpha, (1,))
         return lift, slope
 
+    def settled_lift(self, alpha: Array) -> tuple[Array, Array]:
+        """cl with all separation points at rest (S,), and its slopes against all incidences (S, S) [1/rad]."""
+        if self.mean is None:
+            lift, slope = self.polar_lift(alpha)
+            return lift, np.diag(slope)
+        (factor,), (change,) = self._at(self.seen(alpha), (0,))
+        lift, own = self.lift(alpha, self.static(self.seen(alpha))[0])
+        inside = (factor > 0.25) & (factor < 1.0)
+        by_seen = self.slope * np.sin(alpha - self.zero_lift) * np.where(inside, change, 0.0)
+        return lift, np.diag(own) + by_seen[:, None] * self.mean
+
     def lift_of_point(self, alpha: Array, point: Array) -> Array:
         """d cl/dx at fixed incidence, shape (S,)."""
         root = np.sqrt(np.maximum(point, 1e-12))
@@ -161,9 +179,10 @@ class StripSections:
 
     def advance(self, state: SeparationState, alpha: Array, travelled: Array, lag: SeparationLag) -> SeparationState:
         """State after so many chords (S,) at constant incidence (S,): exact for alpha', second order for x."""
+        seen = self.seen(alpha)
 
         def late(part: float) -> Array:
-            return np.asarray(alpha + (state.incidence - alpha) * np.exp(-part * travelled / lag.delay))
+            return np.asarray(seen + (state.incidence - seen) * np.exp(-part * travelled / lag.delay))
 
         goal, _ = self.static(late(0.5))
         return SeparationState(late(1.0), goal + (state.point - goal) * np.exp(-travelled / lag.response))

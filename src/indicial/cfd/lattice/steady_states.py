@@ -79,7 +79,7 @@ def settle(
     while True:
         count += 1
         across, circulation = problem.solve(sections, across, x)
-        goal, _ = sections.static(problem.incidence(across))
+        goal, _ = sections.static(sections.seen(problem.incidence(across)))
         change = goal - x
         size = float(np.max(np.abs(change)))
         if size < next_try:
@@ -96,7 +96,7 @@ def settle(
             )
     across, circulation = found or problem.solve(sections, across, None)
     alpha = problem.incidence(across)
-    point, _ = sections.static(alpha)
+    point, _ = sections.static(sections.seen(alpha))
     return SteadyStrips(start, across, circulation, alpha, point, growth(problem, sections, across, point, lag), count)
 
 
@@ -108,7 +108,7 @@ def _polished(
         v, circulation = problem.solve(sections, across, None)
     except DivergenceError:
         return None
-    moved = sections.static(problem.incidence(v))[0] - point
+    moved = sections.static(sections.seen(problem.incidence(v)))[0] - point
     return (v, circulation) if float(np.max(np.abs(moved))) <= within else None
 
 
@@ -121,7 +121,8 @@ def growth(problem: StripProblem, sections: StripSections, across: Array, point:
     pushed = inner * (problem.size * speed * sections.lift_of_point(alpha, point))
     moved = -np.linalg.solve(inner * slope + problem.response, pushed)
     turned = (problem.along / speed**2)[:, None] * moved
-    _, answer = sections.static(alpha)
+    turned = turned if sections.mean is None else sections.mean @ turned
+    _, answer = sections.static(sections.seen(alpha))
     one = np.eye(across.size)
     matrix = np.block([[-one / lag.delay, turned / lag.delay], [np.diag(answer) / lag.response, -one / lag.response]])
     return float(np.max(np.linalg.eigvals(matrix).real))

@@ -116,7 +116,8 @@ def steady_wake(edge: Array, motion: RigidMotion, first: float, length: float) -
     """The wake of a body in steady motion, of no circulation yet.
 
     Straight to infinity without rotation; with it on helices, by lines `first` [m] apart and more, a twentieth of a
-    radian at most, until `length` [m], and straight on from there. That of a body at rest runs aft.
+    radian at most, until `length` [m] or until it runs across the wind at the body, and straight on from there: a body
+    in a steady loop or turn would otherwise fly into what it shed a whole turn ago. That of a body at rest runs aft.
     """
     turning = float(np.linalg.norm(motion.rate))
     speed = np.linalg.norm(motion.at(edge), axis=1)
@@ -127,8 +128,9 @@ def steady_wake(edge: Array, motion: RigidMotion, first: float, length: float) -
             edge[None], np.zeros((1, len(edge))), np.zeros((1, len(edge) - 1)), np.tile(aft, (1, len(edge), 1)), aft
         )
     lines, path, step = [edge], [np.zeros(len(edge))], first / fastest
+    forwards = np.mean(motion.at(edge), axis=0)
     if turning * length > 1e-12 * fastest:
-        while np.max(path[-1]) < length:
+        while np.max(path[-1]) < length and forwards @ np.mean(motion.at(lines[-1]), axis=0) > 0.0:
             matrix, shift = motion.carried(step)
             lines.append(lines[-1] @ matrix.T + shift)
             path.append(path[-1] + step * speed)

@@ -42,6 +42,19 @@ def claims(results: Results) -> tuple[Claim, ...]:
         _freedom(piece(results, "freedom")),
         _states(frame),
         _rates(piece(results, "rates")),
+        *_cells(piece(results, "cells"), "one_sided"),
+        *_cells(piece(results, "cells", mesh="forced"), "fourier"),
+        _rocking(
+            (piece(results, "frame", mesh="spread"),),
+            (piece(results, "forced", mesh="spread"),),
+            piece(results, "rocking", mesh="spread"),
+            "with separation spread: where free rocking contradicts both",
+        ),
+        *_spread(
+            piece(results, "frame", mesh="spread"),
+            piece(results, "forced", mesh="spread"),
+            piece(results, "rates", mesh="spread"),
+        ),
     )
 
 
@@ -170,9 +183,11 @@ def _meeting(frame: PieceResult | None, swung: PieceResult | None, forced: Piece
 
 
 def _rocking(
-    frame: tuple[PieceResult | None, ...], forced: tuple[PieceResult | None, ...], rocking: PieceResult | None
+    frame: tuple[PieceResult | None, ...],
+    forced: tuple[PieceResult | None, ...],
+    rocking: PieceResult | None,
+    name: str = "incidences at which free rocking contradicts MRF and FOM both",
 ) -> Claim:
-    name = "incidences at which free rocking contradicts MRF and FOM both"
     if None in (*frame, *forced) or rocking is None:
         return Claim(name, None, 0.0, unit="")
     steady = {alpha: value for one in frame if one for alpha, value in by_alpha(one, "one_sided").items()}
@@ -214,9 +229,10 @@ def _states(frame: PieceResult | None) -> Claim:
     return Claim(name, float(len(several)), None, f"{said} [deg] of {len(rows(frame))}", unit="")
 
 
-def _rates(rates: PieceResult | None) -> Claim:
+def _rates(
+    rates: PieceResult | None, name: str = "Cl_p by MRF from 14 to 20 deg: range over rates and panels"
+) -> Claim:
     """In stall a quotient of differences is no derivative: how far it moves with its own rate and the panels."""
-    name = "Cl_p by MRF from 14 to 20 deg: range over rates and panels"
     if rates is None:
         return Claim(name, None, None, unit="")
     found: dict[float, list[float]] = {}
@@ -224,3 +240,44 @@ def _rates(rates: PieceResult | None) -> Claim:
         found.setdefault(float(row["alpha_deg"]), []).append(float(row["one_sided"]))
     said = "; ".join(f"{alpha:g} deg: {min(values):.2f} to {max(values):.2f}" for alpha, values in found.items())
     return Claim(name, max(float(np.ptp(values)) for values in found.values()), None, said, unit="")
+
+
+def by_strips(cells: PieceResult, spread: float, name: str = "one_sided") -> dict[int, dict[float, float]]:
+    """Cl_p (MRF's if not named) by strips across half a wing, then by incidence [deg], of one spread."""
+    found: dict[int, dict[float, float]] = {}
+    for row in rows(cells):
+        if row["spread"] == spread:
+            found.setdefault(int(row["across"]), {})[float(row["alpha_deg"])] = float(row[name])
+    return found
+
+
+def _cells(cells: PieceResult | None, reading: str) -> list[Claim]:
+    """What the number of strips does where stall comes in cells, and what is left of it where separation spreads."""
+    said = {"one_sided": "MRF from 16 to 22 deg", "fourier": "FOM from 18 to 22 deg"}[reading]
+    names = (f"Cl_p by {said}: range over 8 to 20 strips", "the same, separation spread over one chord")
+    if cells is None:
+        return [Claim(name, None, None, unit="") for name in names]
+    ranges = {}
+    for spread in cells.piece.settings["spreads"]:
+        values = np.array([list(one.values()) for one in by_strips(cells, spread, reading).values()])
+        ranges[spread] = np.ptp(values, axis=0)
+    alphas = cells.piece.settings["alpha_deg"]
+    worst = {spread: f"worst at {alphas[int(np.argmax(found))]:g} deg" for spread, found in ranges.items()}
+    others = ", ".join(
+        f"over {spread:g}: {np.max(found):.2f}" for spread, found in ranges.items() if spread not in (0.0, 1.0)
+    )
+    return [
+        Claim(names[0], float(np.max(ranges[0.0])), None, worst[0.0], unit=""),
+        Claim(names[1], float(np.max(ranges[1.0])), None, worst[1.0], others, unit=""),
+    ]
+
+
+def _spread(frame: PieceResult | None, swung: PieceResult | None, rates: PieceResult | None) -> list[Claim]:
+    """MRF and FOM in stall once more, with a separation that does not depend on the strips."""
+    name = "difference of MRF and FOM at 20 deg with that spread, of Cl_p at 14 deg"
+    of_rates = _rates(rates, "Cl_p by MRF from 14 to 20 deg with it: range over rates and panels")
+    if frame is None or swung is None:
+        return [Claim(name, None, None), of_rates]
+    steady, forced = by_alpha(frame, "one_sided"), by_alpha(swung, "fourier")
+    said = ", ".join(f"{alpha:g} deg: {value:.2f} and {forced[alpha]:.2f}" for alpha, value in steady.items())
+    return [Claim(name, abs(forced[20.0] - steady[20.0]) / abs(forced[14.0]), None, said), of_rates]

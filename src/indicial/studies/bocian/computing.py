@@ -202,6 +202,25 @@ def _rates(piece: Piece, folder: Path | None, progress: Progress) -> Found:
     return records, {"rows": listed}, {}
 
 
+def _cells(piece: Piece, folder: Path | None, progress: Progress) -> Found:
+    """Both methods in stall, or MRF alone, with several numbers of strips and spreads of separation across them."""
+    settings, listed, records = piece.settings, [], []
+    cases = [(spread, across) for spread in settings["spreads"] for across in settings["across"]]
+    for n, (spread, across) in enumerate(cases):
+        one = solver({**settings, "panels": [settings["panels"][0], across], "spread": spread})
+        for alpha in settings["alpha_deg"]:
+            record, row = frame_row(one, alpha, settings["rate"])
+            records.append(record)
+            if "forced" in settings:
+                history, readings = force(one, alpha, settings["forced"])
+                found, swung = _forced_row(one, history, readings)
+                records += found
+                row = {**row, **swung}
+            listed.append({"spread": spread, "across": across, **row})
+        progress((n + 1) / len(cases))
+    return records, {"rows": listed}, {}
+
+
 def _shortfall(piece: Piece, folder: Path | None, progress: Progress) -> Found:
     """Forced roll in attached flow with sections and resolution changed one by one."""
     settings, rows, records = piece.settings, {}, []
@@ -280,6 +299,7 @@ _METHODS: dict[str, Callable[[Piece, Path | None, Progress], Found]] = {
     "loops": _loops,
     "freedom": _freedom,
     "rates": _rates,
+    "cells": _cells,
     "shortfall": _shortfall,
     "rocking": _rocking,
 }

@@ -10,7 +10,7 @@ import numpy as np
 
 from indicial.history import History
 from indicial.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, figure_style, save
-from indicial.studies.bocian.agreement import PAPER, REDUCTIONS, by_alpha, piece, rows
+from indicial.studies.bocian.agreement import PAPER, REDUCTIONS, by_alpha, by_strips, piece, rows
 from indicial.studies.bocian.glider import Glider
 from indicial.studies.kept import Results
 from indicial.studies.piece import PieceResult
@@ -33,10 +33,13 @@ def draw(results: Results, folder: Path) -> tuple[Path, ...]:
         "variants.png": ("variants", _variants),
         "freedom.png": ("freedom", _freedom),
         "rocking.png": ("rocking", _rocking),
+        "cells.png": ("cells", _cells),
     }
     with figure_style() as plt:
         if piece(results, "frame", level="fine") and piece(results, "forced"):
             paths.append(save(_incidence(results, plt), folder / "incidence.png"))
+        if piece(results, "frame", mesh="spread") and piece(results, "forced", mesh="spread"):
+            paths.append(save(_spread(results, plt), folder / "spread.png"))
         for name, (method, function) in drawn.items():
             result = piece(results, method)
             if result is not None:
@@ -108,7 +111,7 @@ def _loops(result: PieceResult, plt: Any) -> Figure:
         ax.set_title(f"alpha {alpha:g} deg")
         ax.set_xlabel("angle of roll [deg]")
     axes[0].set_ylabel("Cl, on half the span")
-    axes[0].legend(fontsize=8, loc="center")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", fontsize=8)
     return figure
 
 
@@ -188,4 +191,41 @@ def _rocking(result: PieceResult, plt: Any) -> Figure:
     axes.set_xlabel("time after release [s]")
     axes.set_ylabel("rate of roll [rad/s]")
     axes.legend(fontsize=8, ncols=2, title="solid: autorotates", title_fontsize=8)
+    return figure
+
+
+def _cells(result: PieceResult, plt: Any) -> Figure:
+    """Cl_p in stall with several numbers of strips, for each spread of separation."""
+    spreads = result.piece.settings["spreads"]
+    figure: Figure
+    figure, axes = plt.subplots(1, len(spreads), figsize=(11.0, 3.6), sharey=True)
+    for ax, spread in zip(axes, spreads, strict=True):
+        for colour, mark, (across, found) in zip(
+            (BLUE, ORANGE, GREEN, VERMILION), "osv^", by_strips(result, spread).items(), strict=True
+        ):
+            ax.plot(list(found), list(found.values()), f"{mark}-", color=colour, ms=4, lw=1.2, label=f"{across} strips")
+        ax.axhline(0.0, color=GREY, lw=0.8)
+        ax.set_title("each strip on its own" if spread == 0.0 else f"spread over {spread:g} c", fontsize=10)
+        ax.set_xlabel("angle of attack [deg]")
+    axes[0].set_ylabel("Cl_p by MRF, on half the span")
+    axes[0].legend(fontsize=8)
+    return figure
+
+
+def _spread(results: Results, plt: Any) -> Figure:
+    """Both methods in stall, each strip on its own and separation spread over a chord."""
+    figure: Figure
+    figure, axes = plt.subplots(figsize=(7.0, 4.2))
+    for colour, method, reading in ((BLUE, "frame", "one_sided"), (PURPLE, "forced", "fourier")):
+        name = {"frame": "MRF", "forced": "FOM"}[method]
+        for mesh, dashes, said in (("base", "o:", "each strip on its own"), ("spread", "s-", "spread over a chord")):
+            found: dict[float, float] = {}
+            for part in (mesh, *(("beyond",) if mesh == "base" else ())):
+                result = piece(results, method, mesh=part, level="fine")
+                found |= {a: v for a, v in by_alpha(result, reading).items() if a >= 13.0} if result else {}
+            axes.plot(list(found), list(found.values()), dashes, color=colour, ms=4, label=f"{name}, {said}")
+    axes.axhline(0.0, color=GREY, lw=0.8)
+    axes.set_xlabel("angle of attack [deg]")
+    axes.set_ylabel(_CLP)
+    axes.legend(fontsize=8)
     return figure

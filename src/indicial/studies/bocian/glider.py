@@ -152,11 +152,12 @@ def make_polars(kind: str) -> PolarTables:
 
 
 def solver(settings: dict[str, Any]) -> SectionLatticeSolver:
-    """The glider of a piece: lattice, sections and time constants."""
+    """The glider of a piece: lattice, sections, time constants and spread of separation."""
     one = glider(settings.get("changes", {}))
     rows, columns = settings["panels"]
     others = {"tailplane": 6, "fin": 5}
     lattice = Lattice.of(one.surfaces(), chordwise=int(rows), spanwise={"wing": int(columns), **others}, camber=False)
     lag = SeparationLag(*settings.get("lag", (SeparationLag.delay, SeparationLag.response)))
     source = changed(polars(settings["polars"]), settings)
-    return SectionLatticeSolver(lattice, one.reference, source, SectionSettings(lag))
+    model = SectionSettings(lag, spread=float(settings.get("spread", 0.0)))
+    return SectionLatticeSolver(lattice, one.reference, source, model)

@@ -60,6 +60,22 @@ SHORTFALL: dict[str, dict[str, Any]] = {
 """What of the roll damping at 4 degrees comes from what: sections and resolution, changed one by one."""
 
 
+SPREAD = 1.0
+"""Chords over which separation sees its neighbours, where a piece has it: see `indicial.cfd.lattice.spanwise`."""
+
+STALLED = [14.0, 16.0, *ALPHAS[17:], 22.0, 24.0]
+RATES: dict[str, Any] = {"alpha_deg": [14.0, 16.0, 18.0, 20.0], "rates": [0.05, 0.1, 0.2], "across": [8, 12, 20]}
+CELLS: dict[str, Any] = {
+    "panels": [6, 12],
+    "alpha_deg": [16.0, 17.0, 18.0, 19.0, 20.0, 21.0, 22.0],
+    "across": [8, 12, 16, 20],
+    "spreads": [0.0, 0.5, SPREAD, 2.0],
+    "rate": PAPER_RATE,
+    "sections": {"reynolds": 0.6e6},
+}
+"""What the number of strips does in stall, for several spreads; one Reynolds number, so that chords are alike."""
+
+
 def _piece(method: str, variant: str, level: str, **settings: Any) -> Piece:
     panels = {"panels": COARSE} if level == "coarse" else {}
     return Piece(method, variant, level, round(flight(0.0).mach, 6), {**BASE, **panels, **settings})
@@ -75,9 +91,33 @@ PIECES: tuple[Piece, ...] = (
     _piece("variants", "base", "fine", alpha_deg=4.0, forced=FORCED, rate=PAPER_RATE, variants=VARIANTS),
     _piece("loops", "base", "fine", alpha_deg=[4.0, 15.0, 20.0], forced=FORCED),
     _piece("forced", "base", "fine", alpha_deg=[*ALPHAS[:14:2], *ALPHAS[14:]], forced=FORCED),
-    _piece("rates", "base", "fine", alpha_deg=[14.0, 16.0, 18.0, 20.0], rates=[0.05, 0.1, 0.2], across=[8, 12, 20]),
+    _piece("rates", "base", "fine", **RATES),
+    _piece("cells", "base", "fine", **CELLS),
+    _piece(
+        "cells",
+        "forced",
+        "fine",
+        alpha_deg=[18.0, 20.0, 22.0],
+        across=[8, 12, 20],
+        spreads=[0.0, SPREAD],
+        rate=PAPER_RATE,
+        forced=FORCED,
+    ),
+    _piece("frame", "spread", "fine", alpha_deg=STALLED, rate=PAPER_RATE, spread=SPREAD),
+    _piece("forced", "spread", "fine", alpha_deg=STALLED, forced=FORCED, spread=SPREAD),
+    _piece("rates", "spread", "fine", **RATES, spread=SPREAD),
     _piece("shortfall", "base", "fine", alpha_deg=4.0, forced=FORCED, cases=SHORTFALL),
     _piece("freedom", "base", "coarse", alpha_deg=STALL, forced=FORCED, cases=FREEDOM),
     _piece("rocking", "base", "coarse", alpha_deg=[*ALPHAS[4::4], 18.0, 19.0, 22.0], first=0.05, end=4.0, step=0.01),
+    _piece(
+        "rocking",
+        "spread",
+        "coarse",
+        alpha_deg=[16.0, 18.0, 19.0, 20.0, 22.0],
+        first=0.05,
+        end=4.0,
+        step=0.01,
+        spread=SPREAD,
+    ),
 )
 """All of them."""
