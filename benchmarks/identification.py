@@ -3,7 +3,7 @@
 An aircraft's record: 500 samples of four channels, four derivatives, the initial state known, from start values 30%
 off. Ours estimates the size and the colour of the noise besides; the peer takes it as stated. On one thread. The peer
 is left out where it is not installed. A range's: eight shots of 54 stations, ten coefficients in common, twelve start
-values each, from 20% off.
+values each, from 20% off. Compiling a model is left out of ours: a second or two the first time, then kept on disk.
 """
 
 from __future__ import annotations

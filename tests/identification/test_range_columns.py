@@ -1,5 +1,8 @@
 """The three reductions of a group side by side."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from flightsim.support import FINNER
@@ -28,3 +31,18 @@ def test_columns_are_the_fits_they_stand_for_and_the_multiple_fit_is_the_surest(
     assert "probable errors" in text
     with pytest.raises(InputError, match="at least one record"):
         reduce_range([], FINNER)
+
+
+def test_a_single_fit_that_fails_is_told() -> None:
+    found = reduce_range([measure(flight(), seed=1)], FINNER, model=range_model())
+    assert "does not converge" not in found.summary()
+    assert "shot 1: the single fit does not converge" in replace(found, single=(None,)).summary()
+
+
+def test_a_shot_that_linear_theory_refuses_is_named() -> None:
+    """Angles all noise: no oscillation to be found."""
+    good = measure(flight(), seed=1)
+    rng = np.random.default_rng(1)
+    still = replace(good, yaw=2e-3 * rng.standard_normal(len(good)), pitch=2e-3 * rng.standard_normal(len(good)))
+    with pytest.raises(InputError, match=r"^shot 2: the angles of this record do not oscillate"):
+        reduce_range([good, still], FINNER, model=range_model())

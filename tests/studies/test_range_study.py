@@ -9,7 +9,7 @@ from indicial.reference_data import read_table
 from indicial.studies.kept import Results
 from indicial.studies.range import STUDY
 from indicial.studies.range.agreement import closing_arrays, implied_noise
-from indicial.studies.range.computing import published, shot
+from indicial.studies.range.computing import damping_error, group_flights, published, shot
 from indicial.studies.range.pieces import PIECES, groups
 
 KEPT = Results.kept("range", STUDY.pieces)
@@ -46,12 +46,26 @@ def test_records_of_different_groups_share_no_noise() -> None:
     assert np.max(np.abs(correlation)) < 4.5 / math.sqrt(scaled.shape[1])
 
 
-def test_implied_noise_is_the_assumed_one_times_printed_over_found_error() -> None:
-    closing = list(KEPT.select(method="closing"))
-    noise = implied_noise(closing)
-    result = next(r for r in closing if r.piece.mach == 3.734)
-    value, error = result.provenance["multiple"]["Cm_q+Cm_alphadot"]
-    assert noise[3.734] == pytest.approx(0.1 * 1.0 / (67.449 * error / abs(value)), rel=1e-3)
+def test_implied_noise_gives_the_printed_error() -> None:
+    """Flown and reduced again at the noise kept, a group has the error that the report prints."""
+    result = next(iter(KEPT.select(method="implied")))
+    settings, noise = result.piece.settings, implied_noise(result)
+    assert set(noise) == set(groups())
+    for mach in (1.293, 3.734):
+        truth = {name: value for name, (value, _) in published(mach).items()}
+        flights = group_flights(truth, groups()[mach], settings)
+        found = damping_error(flights, truth, settings["stations"], {**settings, "angle_deg": noise[mach]})
+        assert found == pytest.approx(published(mach)["Cm_q+Cm_alphadot"][1], rel=2e-3), mach
+
+
+def test_the_error_is_in_proportion_to_all_noise_together_and_not_to_that_of_angles_alone() -> None:
+    settings = next(piece for piece in PIECES if piece.method == "implied").settings
+    truth = {name: value for name, (value, _) in published(2.375).items()}
+    flights = [shot(truth, 2.375, 1.0, 0.0, settings)]
+    once = damping_error(flights, truth, 54, settings)
+    thrice = {**settings, **{name: 3.0 * settings[name] for name in ("position_mm", "angle_deg", "roll_deg")}}
+    assert damping_error(flights, truth, 54, thrice) == pytest.approx(3.0 * once, rel=0.01)
+    assert damping_error(flights, truth, 54, {**settings, "angle_deg": 0.3}) < 2.7 * once
 
 
 def test_errors_fall_with_yaw_and_stations_as_they_must() -> None:

@@ -73,6 +73,7 @@ class RangeReduction:
             lines.append(
                 f"{row['shot']:<8}{row['reduction']:<10}{row['mach']:>7.3f}{row['mean_square_yaw_deg2']:>7.2f}{cells}"
             )
+        lines += [f"shot {i + 1}: the single fit does not converge" for i, fit in enumerate(self.single) if fit is None]
         return "\n".join([*lines, "yaw^2: mean square total yaw [deg^2]; in brackets probable errors, 0.6745 sigma"])
 
 

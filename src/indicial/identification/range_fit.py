@@ -355,7 +355,7 @@ def identify(
     unknown = set(given) - set(known)
     if unknown:
         raise InputError(f"start values of {', '.join(sorted(unknown))} given; unknowns are {', '.join(known)}")
-    theories = tuple(reduce_linearly(shot, vehicle, model.dynamics.atmosphere, model.dynamics.earth) for shot in shots)
+    theories = tuple(_theories(shots, vehicle, model.dynamics))
     values = model.start_values(theories) | {n: v for n, v in given.items() if n in model.free}
     parameters = [Parameter(name, values[name], positive=name == "CA_0") for name in model.free]
     manoeuvres = [
@@ -364,6 +364,17 @@ def identify(
     ]
     fit = fit_manoeuvres(manoeuvres, parameters, estimate_noise=noise == "estimated", threads=threads)
     return RangeFit(fit, model, shots, theories)
+
+
+def _theories(shots: Sequence[RangeRecord], vehicle: Vehicle, dynamics: Dynamics) -> Iterable[LinearTheory]:
+    """Linear theory of each shot; a refusal says of which."""
+    for i, shot in enumerate(shots):
+        try:
+            yield reduce_linearly(shot, vehicle, dynamics.atmosphere, dynamics.earth)
+        except InputError as error:
+            if len(shots) == 1:
+                raise
+            raise InputError(f"shot {i + 1}: {error}") from error
 
 
 def reduce_linearly(

@@ -27,7 +27,7 @@ def claims(results: Results) -> tuple[Claim, ...]:
     return (
         _recovered(closing, complete),
         *_coverage(closing, complete),
-        *_implied(closing),
+        *_implied(next(iter(results.select(method="implied")), None)),
         *_in_flow(next(iter(results.select(method="in_flow")), None)),
     )
 
@@ -78,26 +78,19 @@ def _coverage(closing: list[PieceResult], complete: bool) -> list[Claim]:
     ]
 
 
-def _implied(closing: list[PieceResult]) -> list[Claim]:
-    """Probable error of the damping sum, printed over found: what noise the print implies."""
+def _implied(result: PieceResult | None) -> list[Claim]:
+    """Noise of the angles with which the printed error of the damping sum comes out."""
     name = "angular noise that the printed error of the damping sum implies"
-    ratios = implied_noise(closing)
-    if not ratios:
+    if result is None:
         return [Claim(name, None, None, unit="deg")]
-    said = ", ".join(f"M {mach:g} {noise:.2f}" for mach, noise in ratios.items())
-    return [Claim(name, float(np.median(list(ratios.values()))), None, said, "median", unit="deg")]
+    noise = implied_noise(result)
+    said = ", ".join(f"M {mach:g} {angle:.2f}" for mach, angle in noise.items())
+    return [Claim(name, float(np.median(list(noise.values()))), None, said, "median", unit="deg")]
 
 
-def implied_noise(closing: list[PieceResult]) -> dict[float, float]:
-    """Angular noise [deg] by group, if the error grows as the noise: the assumed one times printed over found error."""
-    found = {}
-    for result in closing:
-        printed = result.provenance["printed_pe_pct"].get(DAMPING)
-        if printed is not None:
-            value, error = result.provenance["multiple"][DAMPING]
-            own = 100.0 * 0.6744897501960817 * error / abs(value)
-            found[result.piece.mach] = float(result.piece.settings["angle_deg"]) * printed / own
-    return found
+def implied_noise(result: PieceResult) -> dict[float, float]:
+    """Angular noise [deg] by group, positions as precise as assumed."""
+    return {row["mach"]: row["angle_deg"] for row in result.provenance["implied"]}
 
 
 def _in_flow(result: PieceResult | None) -> list[Claim]:

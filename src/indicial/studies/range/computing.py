@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
 from indicial.derivatives import Derivative, DerivativeTable
 from indicial.errors import InputError
@@ -35,13 +36,15 @@ from indicial.motion import FlightCondition
 from indicial.reference_data import PROBABLE_ERROR, finner_range
 from indicial.studies.kept import Results
 from indicial.studies.piece import Piece, PieceResult, version
-from indicial.studies.range.pieces import NAMES
+from indicial.studies.range.pieces import NAMES, groups
 from indicial.studies.study import Progress
 
 Found = tuple[list[Derivative], dict[str, Any]]
 """Derivatives and provenance of a piece."""
 
 FINNER = basic_finner_range_model()
+
+DAMPING = "Cm_q+Cm_alphadot"
 
 
 def compute(piece: Piece, folder: Path | None, progress: Progress | None = None) -> PieceResult:
@@ -111,6 +114,37 @@ def shot(truth: dict[str, float], mach: float, yaw_deg2: float, clock: float, se
     return flown(max(size, 0.05))
 
 
+def group_flights(
+    truth: dict[str, float], shots: Sequence[Sequence[float]], settings: dict[str, Any]
+) -> list[Trajectory]:
+    """Shots of these Mach numbers and mean square yaws [deg^2], first seen at angles all round."""
+    return [shot(truth, mach, yaw, 2.0 * math.pi * i / len(shots), settings) for i, (mach, yaw) in enumerate(shots)]
+
+
+def damping_error(flights: list[Trajectory], truth: dict[str, float], stations: int, settings: dict[str, Any]) -> float:
+    """Probable error of the damping sum [per cent] that the stated precision gives, from records without noise."""
+    records = [measure(f, stations, seed=None, precision=precision(settings), roll=True) for f in flights]
+    fit = identify(records, FINNER, model=range_model(), noise="stated", threads=1)
+    return 100.0 * fit.probable_error(DAMPING) / abs(truth[DAMPING])
+
+
+def implied_angle(mach: float, settings: dict[str, Any]) -> float:
+    """Noise of the angles [deg] with which a group's probable error is the printed one, positions as they are.
+
+    The error does not grow in proportion: what positions tell of the motion does not get worse with the angles.
+    """
+    told = published(mach)
+    truth, printed = {name: value for name, (value, _) in told.items()}, told[DAMPING][1]
+    if printed is None:
+        raise InputError(f"no probable error of {DAMPING} is printed at M {mach:g}")
+    flights = group_flights(truth, groups()[mach], settings)
+
+    def excess(angle: float) -> float:
+        return damping_error(flights, truth, settings["stations"], {**settings, "angle_deg": angle}) - printed
+
+    return float(brentq(excess, 0.01, 2.0, xtol=1e-4))
+
+
 def precision(settings: dict[str, Any]) -> Precision:
     """Of the range."""
     return Precision(
@@ -136,10 +170,7 @@ def _measured(flights: list[Trajectory], piece: Piece, number: int) -> list[Rang
 def _closing(piece: Piece, progress: Progress) -> Found:
     settings, told = piece.settings, published(piece.mach)
     truth = {name: value for name, (value, _) in told.items()}
-    flights = [
-        shot(truth, mach, yaw, 2.0 * math.pi * i / len(settings["shots"]), settings)
-        for i, (mach, yaw) in enumerate(settings["shots"])
-    ]
+    flights = group_flights(truth, settings["shots"], settings)
     columns = reduce_range(_measured(flights, piece, 0), FINNER, model=range_model())
     errors, reported = [], []
     for number in range(settings["records"]):
@@ -159,25 +190,29 @@ def _closing(piece: Piece, progress: Progress) -> Found:
 
 
 def _implied(piece: Piece, progress: Progress) -> Found:
-    """Probable error of the damping sum [per cent] by yaw, stations and noise, from records without noise."""
+    """Probable error of the damping sum by yaw, stations and noise; noise that each group's printed error implies."""
     settings = piece.settings
     truth = {name: value for name, (value, _) in published(piece.mach).items()}
     rows, done = [], 0
-    total = len(settings["yaw_deg"]) * len(settings["count"]) * len(settings["angles_deg"])
-    records: list[Derivative] = []
+    total = len(settings["yaw_deg"]) * len(settings["count"]) * len(settings["angles_deg"]) + len(groups())
     for yaw in settings["yaw_deg"]:
         flight = shot(truth, piece.mach, yaw**2, 0.0, settings)
         for stations in settings["count"]:
             for angle in settings["angles_deg"]:
-                exact = {**settings, "angle_deg": angle}
-                record = measure(flight, stations, seed=None, precision=precision(exact), roll=True)
-                fit = identify(record, FINNER, model=range_model(), noise="stated")
-                share = 100.0 * fit.probable_error("Cm_q+Cm_alphadot") / abs(truth["Cm_q+Cm_alphadot"])
+                share = damping_error([flight], truth, stations, {**settings, "angle_deg": angle})
                 rows.append({"yaw_deg": yaw, "stations": stations, "angle_deg": angle, "pe_pct": share})
-                records = records or _records(fit, piece.mach)
                 done += 1
                 progress(done / total)
-    return records, {"rows": rows}
+    implied = []
+    for mach in groups():
+        implied.append({"mach": mach, "printed_pe_pct": published(mach)[DAMPING][1]})
+        implied[-1]["angle_deg"] = implied_angle(mach, settings)
+        done += 1
+        progress(done / total)
+    flight = shot(truth, piece.mach, 1.0, 0.0, settings)
+    record = measure(flight, settings["stations"], seed=None, precision=precision(settings), roll=True)
+    fit = identify(record, FINNER, model=range_model(), noise="stated")
+    return _records(fit, piece.mach), {"rows": rows, "implied": implied}
 
 
 def _in_flow(piece: Piece, progress: Progress) -> Found:
@@ -252,7 +287,7 @@ def _cfd() -> dict[str, dict[str, float]]:
     linear = {r.name: r.value for r in flown.derivatives}
     of_frame = {r.name: r.value for r in frame.derivatives}
     of_steps = {r.name: r.value for r in steps.derivatives}
-    damping, lag = "Cm_q+Cm_alphadot", of_steps["Cm_alphadot"]
+    damping, lag = DAMPING, of_steps["Cm_alphadot"]
     pitching = swung.derivatives.select(name=damping, reduction="fourier").records
     return {
         "operator": {**linear, damping: linear["Cm_q"] + linear["Cm_alphadot"]},

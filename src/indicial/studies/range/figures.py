@@ -70,10 +70,12 @@ def _columns(closing: list[PieceResult], plt: Any) -> Figure:
                 row["mach"], row[DAMPING], yerr=bar, fmt=mark, color=colour, ms=5, capsize=2, lw=0.8, label=label
             )
             seen.add(kind)
-    machs = [r.piece.mach for r in closing]
-    axes.plot(machs, [r.provenance["truth"][DAMPING] for r in closing], "-", color=BLACK, lw=1.0, label="flown")
+    for result in closing:  # one value a group, over the mean Mach numbers of its shots
+        machs, flown = [row["mach"] for row in result.provenance["columns"]], result.provenance["truth"][DAMPING]
+        label = "flown" if result is closing[0] else None
+        axes.plot([min(machs) - 0.02, max(machs) + 0.02], [flown, flown], "-", color=BLACK, lw=1.5, label=label)
     axes.set_ylim(-800.0, 0.0)
-    axes.set_xlabel("Mach number")
+    axes.set_xlabel("mean Mach number of the flight")
     axes.set_ylabel("Cm_q + Cm_alphadot, per d/2V")
     axes.legend(fontsize=8)
     return figure
@@ -81,6 +83,7 @@ def _columns(closing: list[PieceResult], plt: Any) -> Figure:
 
 def _implied(result: PieceResult, closing: list[PieceResult], plt: Any) -> Figure:
     """Probable error over yaw by stations and noise; and the noise that the printed errors imply."""
+    del closing
     figure: Figure
     figure, axes = plt.subplots(1, 2, figsize=(10.5, 4.2))
     rows = result.provenance["rows"]
@@ -104,7 +107,7 @@ def _implied(result: PieceResult, closing: list[PieceResult], plt: Any) -> Figur
     axes[0].minorticks_off()
     axes[0].set_yticks([0.5, 1, 2, 5, 10, 20, 50], ["0.5", "1", "2", "5", "10", "20", "50"])
     axes[0].legend(fontsize=7, ncols=2)
-    noise = implied_noise(closing)
+    noise = implied_noise(result)
     axes[1].plot(list(noise), list(noise.values()), "o", color=BLUE)
     axes[1].axhline(0.1, color=GREY, lw=0.8, label="assumed")
     axes[1].set_ylim(bottom=0.0)

@@ -58,7 +58,7 @@ IMPLIED = Piece(
     2.375,
     {**RANGE, "yaw_deg": [0.25, 0.5, 1.0, 2.0, 4.0], "count": [20, 54, 100], "angles_deg": [0.03, 0.1, 0.3]},
 )
-IN_FLOW = Piece("in_flow", "base", "quick", 2.0, {**RANGE, "flights": [1.0, 3.0], "records": 20})
+IN_FLOW = Piece("in_flow", "base", "quick", 2.0, {**RANGE, "flights": [1.0, 3.0]})
 
 PIECES: tuple[Piece, ...] = (*(_closing(mach, shots) for mach, shots in groups().items()), IMPLIED, IN_FLOW)
 """All of them."""
