@@ -15,6 +15,7 @@ from indicial.identification import (
     Installation,
     Sensor,
     check_compatibility,
+    diagnose,
     measure_flight,
     to_centre_of_gravity,
 )
@@ -131,7 +132,7 @@ def test_errors_of_estimates_are_of_the_size_reported():
 def test_over_100_records_intervals_cover():
     scaled = coverage(range(1000, 1100))
     held = np.mean(np.abs(scaled) < 1.96, axis=0)
-    assert np.all(held >= 0.85), held
+    assert np.all((held >= 0.90) & (held <= 0.99)), held  # 100 records know it within 2%
 
 
 def test_records_without_errors_are_seldom_accused():
@@ -168,8 +169,22 @@ def test_wrong_units_and_gaps_are_noticed():
     with pytest.raises(InputError, match="az is positive"):
         check_compatibility(good.with_channels(az=-good["az"]))
     gap = good["ax"].copy()
-    gap[10] = math.nan
+    gap[10:12] = math.nan
     with pytest.raises(InputError, match="ax has dropouts"):
         check_compatibility(good.with_channels(ax=gap))
     with pytest.raises(InputError, match="no error 'bias_mach'"):
         check_compatibility(good, errors=["bias_mach"])
+
+
+def test_spikes_are_taken_out_and_bridged_before_the_check():
+    good = record(7)
+    spoilt = {name: good[name].copy() for name in ("q", "az", "alpha")}
+    for name, row in (("q", 300), ("az", 500), ("alpha", 640)):
+        spoilt[name][row] += 200.0 * NOISE[name]
+    diagnosis = diagnose(good.with_channels(**spoilt))
+    assert set(diagnosis.spikes) == set(spoilt)
+    found, wanted = check_compatibility(diagnosis.cleaned()), check_compatibility(good)
+    assert found.consistent, found.summary()
+    assert np.isnan(found.corrected()["q"][300])
+    for one, other in zip(found.errors, wanted.errors, strict=True):
+        assert abs(one.value - other.value) < 0.2 * other.standard_error, one.name

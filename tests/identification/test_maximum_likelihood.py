@@ -10,11 +10,11 @@ from scipy.optimize import least_squares
 from flightsim.support import FINNER
 from identification.support import MODEL
 from indicial.conventions import ReferenceQuantities
-from indicial.errors import InputError
+from indicial.errors import DivergenceError, InputError
 from indicial.flightsim import BodyAxisAerodynamics, InitialState, Signal, Vehicle, build_dynamics, fly
 from indicial.flightsim.signals import Schedule
 from indicial.identification import FlightRecord, Manoeuvre, Parameter, SensitivityModel, fit_manoeuvres
-from indicial.identification.coloured import predictors, whiten
+from indicial.identification.coloured import autocorrelations, predictors, whiten
 from indicial.identification.maximum_likelihood import Problem
 from indicial.identification.start_state import StartState
 
@@ -137,6 +137,25 @@ def test_a_start_a_factor_three_off_finds_the_truth_of_records_without_noise(fac
         assert found[name].value == pytest.approx(value, rel=1e-5), name
 
 
+def corner(signs):
+    """Each derivative three times too large or too small."""
+    return [Parameter(n, v * (3.0 if signs >> i & 1 else 1.0 / 3.0)) for i, (n, v) in enumerate(TRUTH.items())]
+
+
+@pytest.mark.parametrize("signs", range(16))
+def test_from_all_starts_a_factor_three_off_segments_find_the_estimate_and_a_single_shot_finds_it_or_says_no(signs):
+    record = simulated(8)
+    wanted = fit_manoeuvres([manoeuvre(record)], parameters())
+    found = [fit_manoeuvres([manoeuvre(record, 10)], corner(signs))]
+    try:
+        found.append(fit_manoeuvres([manoeuvre(record)], corner(signs)))
+    except DivergenceError as error:
+        assert "divide the record into segments" in str(error)  # noqa: PT017
+    for fit in found:
+        for name in TRUTH:
+            assert abs(fit[name].value - wanted[name].value) < 0.01 * wanted[name].standard_error, name
+
+
 def test_multiple_shooting_of_an_unstable_aircraft_finds_what_a_single_shot_finds():
     """From a start that takes the aircraft for stable: seams change the way to the estimate, not the estimate."""
     unstable = TRUTH | {"Cm_alpha": 0.5}
@@ -174,17 +193,20 @@ def test_a_prior_and_a_record_weigh_as_two_measurements_do():
     )
 
 
-def test_the_filter_makes_first_order_noise_white_exactly():
-    """Its matrix W satisfies W C W' = 1 for the noise's covariance C, the first samples and a gap included."""
-    n, rho = 12, 0.9
+@pytest.mark.parametrize("reflection", [[0.9], [0.9, -0.5], [0.7, 0.2, -0.6]])
+def test_the_filter_makes_coloured_noise_white_exactly(reflection):
+    """Its matrix W satisfies W C W' = 1 for the noise's covariance C, the first samples and gaps included."""
+    n, reflection = 14, np.array(reflection)
     known = np.ones(n, dtype=bool)
-    known[5] = False
-    filtering = whiten(np.eye(n), np.array([rho]), known)[known][:, known]
-    apart = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
-    covariance = rho**apart
-    covariance[:5, 6:] = covariance[6:, :5] = 0.0  # memory does not reach over a gap
-    covariance = covariance[np.ix_(known, known)]
-    np.testing.assert_allclose(filtering @ covariance @ filtering.T, np.eye(n - 1), atol=1e-12)
+    known[[1, 5, 8, 9, 10]] = False
+    filtering = whiten(np.eye(n), reflection, known)[known][:, known]
+    phi, _ = predictors(reflection)[-1]
+    lags = list(autocorrelations(reflection))
+    while len(lags) < n:
+        lags.append(sum(c * lags[-i] for i, c in enumerate(phi, start=1)))
+    covariance = np.array(lags)[np.abs(np.subtract.outer(np.arange(n), np.arange(n)))][np.ix_(known, known)]
+    np.testing.assert_allclose(filtering @ covariance @ filtering.T, np.eye(n - 5), atol=1e-12)
+    np.testing.assert_allclose(np.triu(filtering, 1), 0.0)  # from those before
 
 
 def test_predictors_solve_the_equations_of_yule_and_walker():
@@ -240,6 +262,72 @@ def test_dropouts_outliers_and_a_bias():
     assert any("channel q" in text for text in found.suspicious())
     assert found.against({"Cm_q": -14.0, "CZ_alpha": -9.0, "Cm_alpha": (-0.8, 0.1)})[1].verdict == "shifted"
     assert "Cm_q" in found.summary()
+
+
+def spoilt_record(seed, memory=0.0):
+    """Each channel with 3% of its samples off by 8 to 30 standard deviations."""
+    record, random = simulated(seed, memory, samples=500), np.random.default_rng(seed)
+    channels = {}
+    for name, sd in NOISE.items():
+        rows = random.choice(len(record), 15, replace=False)
+        channels[name] = record[name].copy()
+        channels[name][rows] += sd * random.uniform(8.0, 30.0, 15) * random.choice([-1.0, 1.0], 15)
+    return record, record.with_channels(**channels)
+
+
+def fitted_without_outliers(record):
+    """Outliers left out until none is told, as a user would."""
+    fit = fit_manoeuvres([manoeuvre(record)], parameters())
+    for _ in range(6):
+        records = fit.without_outliers()
+        if all(
+            np.array_equal(a.measured, b.measured, equal_nan=True) for a, b in zip(records, fit.manoeuvres, strict=True)
+        ):
+            return fit
+        fit = fit_manoeuvres(records, parameters())
+    return fit
+
+
+@pytest.mark.parametrize(("memory", "worse"), [(0.0, 2.0), (0.9, 1.0)])
+def test_without_outliers_a_fit_is_that_of_the_sound_record(memory, worse):
+    sound, spoilt = spoilt_record(3, memory)
+    clean = fit_manoeuvres([manoeuvre(sound)], parameters())
+    kept = fit_manoeuvres([manoeuvre(spoilt)], parameters())
+    found = fitted_without_outliers(spoilt)
+    gone = np.isnan(found.manoeuvres[0].measured)
+    put = manoeuvre(spoilt).measured != manoeuvre(sound).measured
+    assert np.count_nonzero(gone & ~put) <= 0.01 * put.size
+    assert np.count_nonzero(put & ~gone) <= 2  # 60 of 8 standard deviations, less what noise took
+    for name in TRUTH:
+        error = clean[name].standard_error
+        assert abs(found[name].value - clean[name].value) < 1.0 * error
+        assert found[name].standard_error == pytest.approx(error, rel=0.25)
+    assert sum(kept[n].standard_error for n in TRUTH) > worse * sum(clean[n].standard_error for n in TRUTH)
+
+
+def test_outliers_of_one_record_are_taken_from_that_record():
+    sound = [simulated(seed) for seed in (11, 12)]
+    q = sound[1]["q"].copy()
+    q[77] += 0.2
+    records = [manoeuvre(sound[0], name="a"), manoeuvre(sound[1].with_channels(q=q), name="b")]
+    left = fit_manoeuvres(records, parameters()).without_outliers()
+    assert not np.isnan(left[0].measured).any()
+    np.testing.assert_array_equal(np.argwhere(np.isnan(left[1].measured)), [[77, CHANNELS.index("q")]])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("memory", [0.0, 0.9])
+def test_intervals_cover_without_outliers(memory):
+    errors, reported = [], []
+    for seed in range(200):
+        found = fitted_without_outliers(spoilt_record(seed, memory)[1])
+        errors.append([found[n].value - v for n, v in TRUTH.items()])
+        reported.append([found[n].standard_error for n in TRUTH])
+    errors, reported = np.array(errors), np.array(reported)
+    held = np.mean(np.abs(errors / reported) < 1.96, axis=0)
+    ratio = reported.mean(axis=0) / errors.std(axis=0)
+    assert np.all((held >= 0.90) & (held <= 0.98)), (held, ratio)
+    np.testing.assert_allclose(ratio, 1.0, rtol=0.15, err_msg=str(held))
 
 
 def test_wrong_units_and_signs_are_told():

@@ -3,6 +3,7 @@
 from indicial.identification.accuracy import Whiteness
 from indicial.identification.coefficients import aerodynamic_coefficient, polynomial_terms, regressor
 from indicial.identification.compatibility import Compatibility, check_compatibility
+from indicial.identification.diagnosis import RecordDiagnosis, diagnose
 from indicial.identification.differentiation import differentiate
 from indicial.identification.equation_error import EquationError, equation_error
 from indicial.identification.estimate import Estimate
@@ -56,6 +57,7 @@ __all__ = [
     "RangeRecord",
     "RangeReduction",
     "Ranking",
+    "RecordDiagnosis",
     "SensitivityModel",
     "Sensor",
     "StateModel",
@@ -64,6 +66,7 @@ __all__ = [
     "Whiteness",
     "aerodynamic_coefficient",
     "check_compatibility",
+    "diagnose",
     "differentiate",
     "equation_error",
     "filter_error",

@@ -141,8 +141,8 @@ def check_compatibility(
     Parameters
     ----------
     record : FlightRecord
-        With ``ax ay az p q r`` at all instants, at the centre of gravity (`to_centre_of_gravity`), and some of
-        `OUTPUTS`.
+        With ``ax ay az p q r`` at the centre of gravity (`to_centre_of_gravity`), and some of `OUTPUTS`. Of the former
+        single missing samples, such as spikes taken out, are bridged by straight lines; longer gaps are refused.
     errors : sequence of str, optional
         What to look for: ``bias_``, ``scale_`` or ``delay_`` and a channel (delays of `OUTPUTS` only); `DEFAULT` as far
         as the record has the channels, if not given; of scales those of channels that move beyond their noise.
@@ -160,16 +160,23 @@ def check_compatibility(
     seen = tuple(name for name in OUTPUTS if name in record.channels)
     if not seen:
         raise InputError(f"a compatibility check needs some of {', '.join(OUTPUTS)} to compare with")
-    for name in IMU:
-        if not np.all(np.isfinite(record[name])):
-            raise InputError(f"{name} has dropouts: a compatibility check integrates it, so select a part without")
+    whole = record.with_channels(**{name: _bridged(record, name) for name in IMU})
     place = record.provenance.get("installation", {})
     if any(place.get("accelerometers", ())) or any(place.get("vanes", ())):
         raise InputError("the instruments are off the centre of gravity: move them there by to_centre_of_gravity first")
     wanted = _wanted(errors, seen, record)
-    _check_units(record, g)
+    _check_units(whole, g)
     with threadpool_limits(limits=1, user_api="blas"):
-        return _Fit(record, seen, wanted, g).solve()
+        return replace(_Fit(whole, seen, wanted, g).solve(), record=record)
+
+
+def _bridged(record: FlightRecord, name: str) -> Array:
+    """A channel with single missing samples between its neighbours."""
+    values, known = record[name], np.isfinite(record[name])
+    if not (known[0] and known[-1] and np.all(known[1:] | known[:-1])):
+        raise InputError(f"{name} has dropouts: a compatibility check integrates it, so select a part without")
+    bridged: Array = np.interp(record.time, record.time[known], values[known])
+    return np.where(known, values, bridged)
 
 
 def _wanted(errors: Sequence[str] | None, seen: tuple[str, ...], record: FlightRecord) -> tuple[str, ...]:
@@ -187,11 +194,7 @@ def _wanted(errors: Sequence[str] | None, seen: tuple[str, ...], record: FlightR
 
 def _check_units(record: FlightRecord, g: float) -> None:
     """Refuse rates and accelerations of which the size says that the unit or the sign is wrong."""
-    felt = np.sqrt(sum(record[name] ** 2 for name in ("ax", "ay", "az")))
-    if 0.5 / g < float(np.median(felt)) / g < 2.0 / g and float(np.max(felt)) < 0.6 * g:
-        raise InputError(f"ax, ay, az are of size {np.median(felt):.3g}: they look like multiples of g, not m/s^2")
-    if float(np.median(record["az"])) > 0.5 * g:
-        raise InputError("az is positive on the whole: it must be specific force, downward, about -g in level flight")
+    check_accelerations(record, g)
     for angle, rate in (("theta", "q"), ("phi", "p"), ("psi", "r")):
         if angle not in record.channels:
             continue
@@ -201,6 +204,15 @@ def _check_units(record: FlightRecord, g: float) -> None:
         if turned > 20.0 * max(change, 0.02):
             times = turned / max(change, 1e-9)
             raise InputError(f"{rate} turns the vehicle {times:.3g} times as far as {angle} does: is it in deg/s?")
+
+
+def check_accelerations(record: FlightRecord, g: float = 9.80665) -> None:
+    """Refuse ax, ay, az that look like multiples of g or forces the other way round."""
+    felt = np.sqrt(sum(record[name] ** 2 for name in ("ax", "ay", "az")))
+    if 0.5 / g < float(np.nanmedian(felt)) / g < 2.0 / g and float(np.nanmax(felt)) < 0.6 * g:
+        raise InputError(f"ax, ay, az are of size {np.nanmedian(felt):.3g}: they look like multiples of g, not m/s^2")
+    if float(np.nanmedian(record["az"])) > 0.5 * g:
+        raise InputError("az is positive on the whole: it must be specific force, downward, about -g in level flight")
 
 
 def _differs(estimate: Estimate, looked_for: int) -> bool:

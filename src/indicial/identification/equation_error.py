@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -14,8 +14,10 @@ from indicial.derivatives import DerivativeTable
 from indicial.errors import InputError
 from indicial.flightsim import Vehicle
 from indicial.identification.coefficients import aerodynamic_coefficient, regressor
+from indicial.identification.coloured import reflections, whiten
 from indicial.identification.estimate import Estimate, identified_table
 from indicial.identification.least_squares import check_regressors, coloured_covariance, solve, spectral_covariance
+from indicial.identification.outliers import outlying
 from indicial.identification.record import FlightRecord
 from indicial.motion import FlightCondition
 
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Domain = Literal["time", "frequency"]
+
+_MOST_LEFT_OUT = 0.1
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,10 @@ class EquationError:
     mach : float or None
         Mean of the record, if it has it.
     reference : ReferenceQuantities
+    left_out : ndarray
+        Instants left out as outliers [s], shape (m,).
+    outliers : int
+        Residuals so large that one in a hundred fits would have one by chance; they are in the fit. In frequency 0.
     """
 
     coefficient: str
@@ -59,6 +67,8 @@ class EquationError:
     neighbours: float
     mach: float | None
     reference: ReferenceQuantities
+    left_out: Array = field(default_factory=lambda: np.zeros(0))
+    outliers: int = 0
 
     def __getitem__(self, name: str) -> Estimate:
         """One estimate by name.
@@ -116,6 +126,10 @@ class EquationError:
         lines += [f"  {estimate.summary()}" for estimate in self.estimates]
         if self.domain == "time":
             lines.append(f"  neighbouring residuals correlate by {self.neighbours:.2f}: standard errors allow for it")
+        if self.left_out.size:
+            lines.append(f"  {self.left_out.size} outliers left out, first at {self.left_out[0]:.4g} s")
+        if self.outliers:
+            lines.append(f"  {self.outliers} residuals look like outliers and are in the fit: leave_out_outliers?")
         return "\n".join(lines)
 
     def plot(self) -> Figure:
@@ -142,6 +156,7 @@ def equation_error(
     *,
     band: tuple[float, float] | None = None,
     thrust: ArrayLike = 0.0,
+    leave_out_outliers: bool = False,
 ) -> EquationError:
     r"""Least squares of an aerodynamic coefficient on regressors.
 
@@ -164,28 +179,37 @@ def equation_error(
         Lowest and highest frequency [Hz]; the record must be evenly sampled without dropouts.
     thrust : array_like
         Force along x through the centre of gravity, besides the aerodynamic one [N], scalar or (n,).
+    leave_out_outliers : bool
+        Whether samples whose white residual no Gaussian noise would leave are taken out and the rest is fitted again,
+        until none is left; in time only. Outliers of regressors pull the fit to themselves and may hide: take them out
+        of the record first (`diagnose`).
 
     Raises
     ------
     InputError
-        If a name is not known, a channel is lacking or dead, a regressor does not change or depends on the others, or
-        there is too little data.
+        If a name is not known, a channel is lacking or dead, a regressor does not change or depends on the others,
+        there is too little data, or every tenth sample is an outlier.
     """
     response, columns = read_equation(record, vehicle, coefficient, regressors, thrust)
     known = np.isfinite(response) & np.all(np.isfinite(columns), axis=1)
     labels = [f"{coefficient}_{name}" for name in regressors]
-    neighbours = float("nan")
+    neighbours, outliers, left_out = float("nan"), 0, np.zeros(0)
     if band is None:
         axis, measured, columns = record.time[known], response[known], columns[known]
         _enough(axis.size, len(labels), "samples with all of its channels")
         check_regressors(regressors, columns)
         columns = np.column_stack([np.ones(axis.size), columns])
         labels = [f"{coefficient}_0", *labels]
+        sound = _sound(columns, measured) if leave_out_outliers else np.ones(axis.size, dtype=bool)
+        left_out, axis, columns, measured = axis[~sound], axis[sound], columns[sound], measured[sound]
         values, inverse = solve(columns, measured)
         fitted = columns @ values
+        outliers = int(np.count_nonzero(_loud(measured - fitted)))
         covariance, correlation = coloured_covariance(columns, measured - fitted, inverse)
         neighbours = float(correlation[1])
     else:
+        if leave_out_outliers:
+            raise InputError("outliers can be left out in time only: a band needs every sample")
         axis, measured, transforms = _transformed(record, response, columns, known, band, regressors)
         stacked = np.concatenate([transforms.real, transforms.imag])
         values, inverse = solve(stacked, np.concatenate([measured.real, measured.imag]))
@@ -197,8 +221,32 @@ def equation_error(
     mach = float(np.nanmean(record["mach"])) if np.any(np.isfinite(record.channels.get("mach", np.nan))) else None
     domain: Domain = "time" if band is None else "frequency"
     return EquationError(
-        *(coefficient, domain, estimates, covariance, axis, measured, fitted, neighbours, mach, vehicle.reference)
+        *(coefficient, domain, estimates, covariance, axis, measured, fitted, neighbours, mach, vehicle.reference),
+        *(left_out, outliers),
     )
+
+
+def _sound(columns: Array, measured: Array) -> Any:
+    """Samples that are no outliers of a fit to themselves, bool of shape (n,)."""
+    sound = np.ones(measured.size, dtype=bool)
+    while True:
+        values, _ = solve(columns[sound], measured[sound])
+        loud = _loud(measured[sound] - columns[sound] @ values)
+        if not np.any(loud):
+            return sound
+        sound[np.flatnonzero(sound)[loud]] = False
+        gone = np.count_nonzero(~sound)
+        if gone > _MOST_LEFT_OUT * measured.size:
+            raise InputError(
+                f"{gone} of {measured.size} samples look like outliers: the model lacks something, or a channel is bad"
+            )
+
+
+def _loud(residuals: Array) -> Any:
+    """Outliers among residuals, bool of shape (n,)."""
+    memory = reflections([residuals])
+    white = whiten(residuals, memory, np.ones(residuals.size, dtype=bool))
+    return outlying(white, memory.size)
 
 
 def read_equation(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
@@ -13,22 +13,15 @@ from indicial.conventions import Array
 from indicial.errors import InputError
 from indicial.identification.coloured import predictors
 from indicial.identification.estimate import Estimate
+from indicial.identification.outliers import outlier_limit, outlying, robust_scale
 from indicial.identification.problem import Manoeuvre
+from indicial.identification.unit_guess import guess_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _SURE = 1.96  # standard errors of a 95% interval
 _LOUD = 5.0  # times the stated noise, from which a channel is told to be suspicious
-_UNITS = {
-    math.degrees(1.0): "degrees",
-    math.radians(1.0): "radians for degrees",
-    1.0 / 9.80665: "multiples of g",
-    9.80665: "multiples of g taken for m/s^2",
-    -1.0: "the other sign",
-    1.0 / 0.3048: "feet",
-    0.3048: "metres for feet",
-}
 _UNSEEN = 0.5  # standard error over the larger of the two values, from which nothing is said of it
 
 
@@ -146,13 +139,10 @@ class OutputErrorFit:
         counted in a standard deviation from the median, which outliers do not move. Noise of five times the stated and
         more is told, with the unit or sign that would explain it.
         """
-        from scipy.special import ndtri
-
         found = []
-        total = sum(w.size for w in self.white.values())
-        limit = float(-ndtri(0.005 / total))
+        limit = outlier_limit(sum(w.size for w in self.white.values()))
         for channel, white in self.white.items():
-            scale = float(np.median(np.abs(white))) / 0.6745
+            scale = robust_scale(white)
             number = int(np.count_nonzero(np.abs(white) > limit * scale)) if scale > 0.0 else 0
             if number:
                 worst = float(np.max(np.abs(white))) / scale
@@ -161,6 +151,25 @@ class OutputErrorFit:
                 guess = self._guess(channel)
                 found.append(f"channel {channel}: residuals of {self.noise[channel]:.3g} times the stated noise{guess}")
         return tuple(found)
+
+    def without_outliers(self) -> tuple[Manoeuvre, ...]:
+        """The records without what `suspicious` calls outliers (NaN), to be fitted again.
+
+        Of several within the memory of the channel's noise only the largest goes: see what the next fit says of others.
+        """
+        measured = [m.measured.copy() for m in self.manoeuvres]
+        total = sum(w.size for w in self.white.values())
+        for channel, white in self.white.items():
+            reach, scale, first = self.memory[channel].size, robust_scale(white), 0
+            for m, residuals, values in zip(self.manoeuvres, self.residuals, measured, strict=True):
+                if channel not in m.model.channels:
+                    continue
+                i = m.model.channels.index(channel)
+                known = np.flatnonzero(np.isfinite(residuals[:, i]))
+                part = white[first : first + known.size]
+                first += known.size
+                values[known[outlying(part, reach, total, scale)], i] = np.nan
+        return tuple(replace(m, measured=values) for m, values in zip(self.manoeuvres, measured, strict=True))
 
     def _guess(self, channel: str) -> str:
         """A unit or sign by which what was measured is a multiple of what was fitted."""
@@ -173,9 +182,9 @@ class OutputErrorFit:
                 fitted.append(m.measured[known, i] - residuals[known, i])
         seen, made = np.concatenate(measured), np.concatenate(fitted)
         slope = float(seen @ made) / float(made @ made) if np.any(made) else 1.0
-        for factor, words in _UNITS.items():
-            if abs(slope / factor - 1.0) < 0.05:
-                return f": it is {slope:.3g} times what the model gives, so {words}?"
+        words = guess_unit(slope)
+        if words is not None:
+            return f": it is {slope:.3g} times what the model gives, so {words}?"
         return ": outliers, or a model that lacks something?"
 
     def against(self, before: Mapping[str, float | tuple[float, float]]) -> tuple[Verdict, ...]:
