@@ -156,7 +156,7 @@ def _draw(panels: Array, by_panels: list[float], by_steps: list[float], theirs: 
     for axes, places in ((left, panels), (right, np.array(STEPS))):
         axes.minorticks_off()
         axes.set_xticks(places, [f"{place:g}" for place in places])
-        axes.legend()
+        axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize=8)
         axes.grid(True, alpha=0.3)
     folder = Path(__file__).parent / "out"
     folder.mkdir(exist_ok=True)
