@@ -44,6 +44,45 @@ def test_derivatives_that_only_act_as_a_sum_are_named_with_their_sum():
     assert "CA_0" not in finding
 
 
+def test_what_goes_together_is_named_together_with_the_combination_that_is_told():
+    """Two pairs, of which the record tells a + 2 b and c + d - and neither of them by itself."""
+    rng = np.random.default_rng(4)
+    wave = rng.standard_normal((200, 4))
+    little = 1e-4 * rng.standard_normal((200, 2))
+    x = np.stack(
+        [wave[:, 0], 2.0 * wave[:, 0] + little[:, 0], wave[:, 1], wave[:, 1] + little[:, 1], wave[:, 2]], axis=1
+    )
+    findings = undetermined(("a", "b", "c", "d", "e"), np.ones(5), cramer_rao(x / 1e-3))
+    assert len(findings) == 2
+    (one,) = (text for text in findings if "a +-" in text)
+    (other,) = (text for text in findings if "c +-" in text)
+    assert "it determines a + 2 b, +-" in one or "it determines b + 0.5 a, +-" in one
+    assert "their sum" in other
+    assert not any("e +-" in text for text in findings)
+
+
+def test_three_that_go_together_are_one_finding_and_a_strong_scale_hides_none():
+    """a + b - c acts on nothing; whatever the units, all three are named and the fourth is not."""
+    rng = np.random.default_rng(5)
+    wave = rng.standard_normal((200, 3))
+    x = np.stack(
+        [wave[:, 0], wave[:, 1], wave[:, 0] + wave[:, 1] + 1e-4 * wave[:, 2], rng.standard_normal(200)], axis=1
+    )
+    for units in (np.ones(4), np.array([1e-3, 1.0, 1e4, 1e6])):
+        (finding,) = undetermined(("a", "b", "c", "e"), 1.0 / units, cramer_rao(x * units / 1e-3))
+        assert all(f"{name} +-" in finding for name in "abc")
+        assert "e +-" not in finding
+
+
+def test_two_pairs_with_one_in_common_are_one_group():
+    rng = np.random.default_rng(6)
+    wave = rng.standard_normal((200, 3))
+    x = np.stack([wave[:, 0], wave[:, 0] + 1e-4 * wave[:, 1], wave[:, 0] + 1e-4 * wave[:, 2]], axis=1)
+    (finding,) = undetermined(("a", "b", "c"), np.ones(3), cramer_rao(x / 1e-3))
+    assert all(f"{name} +-" in finding for name in "abc")
+    assert finding.count(" + 1 ") == 2
+
+
 def test_a_derivative_lost_in_its_error_is_named_and_a_good_one_is_not():
     covariance = np.diag([4.0, 1e-4])
     (finding,) = undetermined(("CN_alpha", "CA_0"), np.array([3.0, 0.5]), covariance)

@@ -144,6 +144,16 @@ def test_a_designed_control_tells_more_than_the_one_it_began_with_and_stays_with
     assert len(designed.plot().axes) == 1 + len(NOISE)
 
 
+def test_a_designed_control_tells_more_than_the_best_3_2_1_1_of_its_size_and_length():
+    units = np.linspace(0.3, 1.2, 10)
+    classic = rank_manoeuvres(experiment(), {f"{u:.1f} s": {"elevator": Signal.multistep(0.03, u, 0.5)} for u in units})
+    best = classic.promises[classic.best]
+    designed = improve_input(experiment(), "elevator", best.inputs["elevator"], 0.03, steps=20)
+    assert np.max(np.abs(designed.inputs["elevator"].value)) <= 0.03 + 1e-12
+    assert designed.log_determinant < best.log_determinant
+    assert np.mean(designed.standard_errors / best.standard_errors) < 1.0
+
+
 def test_a_start_that_breaks_a_limit_between_the_samples_is_not_what_is_designed():
     # the pulse stands between the middles of the two steps, so the sampled start is no motion at all
     pulse = Signal.pieces(np.array([0.0, 4.5, 5.5, 10.0]), np.array([0.0, -0.3, 0.0]), 0.0, 0.0)
@@ -161,6 +171,8 @@ def test_what_makes_no_sense_is_refused():
         improve_input(experiment(), "elevator", Signal.step(0.03), 0.03, limits={"alpha": (0.049, 0.051)})
     with pytest.raises(InputError, match="no channel 'beta'"):
         improve_input(experiment(), "elevator", Signal.step(0.0), 0.03, limits={"beta": (0.0, 1.0)})
+    with pytest.raises(InputError, match="Cm_q is believed to be 0"):
+        replace(experiment(), values=TRUTH | {"Cm_q": 0.0}).judge({})
     with pytest.raises(InputError, match="harmonics"):
         multisines(TIME, {"elevator": 0.1}, (0.2, 0.21))
     with pytest.raises(InputError, match="no parameter 'Cn_r'"):

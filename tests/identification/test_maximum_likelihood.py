@@ -1,5 +1,6 @@
 """Output error of several records: an aircraft's longitudinal motion, its derivatives as free symbols."""
 
+from dataclasses import replace
 from functools import cache
 
 import casadi as ca
@@ -11,7 +12,7 @@ from flightsim.support import FINNER
 from identification.support import MODEL
 from indicial.conventions import ReferenceQuantities
 from indicial.errors import DivergenceError, InputError
-from indicial.flightsim import BodyAxisAerodynamics, InitialState, Signal, Vehicle, build_dynamics, fly
+from indicial.flightsim import ALPHA, BodyAxisAerodynamics, InitialState, Signal, Vehicle, build_dynamics, fly
 from indicial.flightsim.signals import Schedule
 from indicial.identification import FlightRecord, Manoeuvre, Parameter, SensitivityModel, fit_manoeuvres
 from indicial.identification.coloured import autocorrelations, predictors, whiten
@@ -166,6 +167,47 @@ def test_multiple_shooting_of_an_unstable_aircraft_finds_what_a_single_shot_find
         error = one[name].standard_error
         assert abs(many[name].value - value) < 4.0 * error, name
         assert many[name].value == pytest.approx(one[name].value, abs=1e-3 * error), name
+
+
+def held_by_feedback(duration, samples, seed):
+    """A record of an unstable aircraft whose elevator answers to the angle of attack; the elevator is recorded."""
+    truth, gain = TRUTH | {"Cm_alpha": 0.5}, 1.2
+    values = {name: value for name, value in truth.items() if name != "Cm_elevator"}
+    moving = ca.SX.sym("excitation") + gain * (ALPHA - 0.05)
+    held = replace(aircraft().aerodynamics, **values, Cm_0=0.04 + truth["Cm_elevator"] * moving)
+    time = np.linspace(0.0, duration, samples)
+    excitation = Signal(time, 0.02 * np.sin(1.3 * time) + 0.015 * np.sin(2.9 * time + 1.0))
+    flown = fly(
+        build_dynamics(aircraft().vehicle, held),
+        START,
+        duration,
+        method="dop853",
+        step=duration / (samples - 1),
+        tolerance=1e-11,
+        parameters={"excitation": excitation},
+    ).at_times(time)
+    exact = {"alpha": flown.alpha, "q": flown.rate[:, 1], "theta": flown.euler[:, 1], "V": flown.speed}
+    exact["az"] = flown.force[:, 2] / aircraft().vehicle.mass
+    noise = NOISE | {"V": 0.1}
+    rng = np.random.default_rng(seed)
+    channels = {c: values + noise[c] * rng.standard_normal(samples) for c, values in exact.items()}
+    return FlightRecord(time, channels, {"elevator": excitation.at(time) + gain * (flown.alpha - 0.05)}, noise), truth
+
+
+def test_segments_save_a_long_record_of_an_unstable_aircraft_where_one_shot_is_lost():
+    record, truth = held_by_feedback(20.0, 1001, seed=1)
+    model = SensitivityModel.of(aircraft(), tuple(record.channels))
+    start = [Parameter(name, 0.8 * value) for name, value in truth.items()]
+
+    def shot(segments):
+        free = ("alpha", "theta", "q", "V")
+        return Manoeuvre.of_flight(record, aircraft(), START, free_start=free, segments=segments, model=model)
+
+    with pytest.raises(DivergenceError, match="segments"):
+        fit_manoeuvres([shot(1)], start)
+    found = fit_manoeuvres([shot(40)], start)
+    for name, value in truth.items():
+        assert abs(found[name].value - value) < 4.0 * found[name].standard_error, name
 
 
 def test_records_share_parameters_and_threads_change_nothing():

@@ -1,5 +1,8 @@
 """Profiles: the bound's parabola where the model is linear, other than it where it is not, and coverage there."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import binom
@@ -7,8 +10,9 @@ from scipy.stats import binom
 from identification.test_lag_support import FREE, TRUTH, compiled, exact, manoeuvre
 from identification.test_lag_support import NOISE as LAG_NOISE
 from identification.test_maximum_likelihood import CHANNELS, START, aircraft, parameters, simulated
-from indicial.errors import InputError
+from indicial.errors import DivergenceError, InputError
 from indicial.identification import Manoeuvre, Parameter, SensitivityModel, fit_manoeuvres, profile_likelihood
+from indicial.identification.profile_likelihood import _Walk
 
 
 def test_of_an_offset_the_profile_is_the_bound_s_parabola():
@@ -63,6 +67,59 @@ def test_the_profile_covers_where_the_bound_does_not():
         held += found.lower <= LAG[2] <= found.upper
         bound += found.bound[0] <= LAG[2] <= found.bound[1]
     assert binom.cdf(held, count, 0.95) > 0.005, (held, bound)
+
+
+class Known(_Walk):
+    """A walk along a D that is known."""
+
+    def __init__(self, cost, centre, positive=False):
+        self.seen, self.centre, self.least, self.cost = {}, centre, 0.0, cost
+        self.chosen = Parameter("b", centre, positive=positive)
+
+    def _cost(self, value):
+        return self.cost(value)
+
+
+def logarithmic(width):
+    """J of an estimate that is normal in its logarithm, about 1; it has no value at 0 or below."""
+
+    def cost(value):
+        assert value > 0.0, "flown with a value that is not positive"
+        return 0.5 * (math.log(value) / width) ** 2
+
+    return cost
+
+
+def test_ends_of_a_known_likelihood_are_found():
+    walk = Known(logarithmic(0.5), 1.0, positive=True)
+    assert walk.end(-1.0, 1.96, 0.5) == pytest.approx(math.exp(-0.98), rel=0.02)
+    assert walk.end(1.0, 1.96, 0.5) == pytest.approx(math.exp(0.98), rel=0.02)
+
+
+def test_a_positive_parameter_is_never_flown_below_zero_and_its_interval_ends_there():
+    """With a standard error as large as the value the bound's interval would begin at -0.96."""
+    assert Known(logarithmic(1.0), 1.0, positive=True).end(-1.0, 1.96, 1.0) == pytest.approx(math.exp(-1.96), rel=0.03)
+    assert Known(logarithmic(50.0), 1.0, positive=True).end(-1.0, 1.96, 1.0) == 0.0
+
+
+def test_where_fits_cease_to_converge_the_interval_is_open():
+    def cost(value):
+        if value > 1.4:
+            raise DivergenceError("lost")
+        return 0.5 * (value - 1.0) ** 2
+
+    walk = Known(cost, 1.0)
+    assert walk.end(1.0, 1.96, 1.0) == math.inf
+    assert walk.end(-1.0, 1.96, 1.0) == pytest.approx(-0.96, rel=0.02)
+
+
+def test_a_fit_that_was_not_at_its_minimum_is_told():
+    from identification.test_maximum_likelihood import manoeuvre as whole
+
+    fit = fit_manoeuvres([whole(simulated(3))], parameters())
+    moved = tuple(replace(e, value=e.value + 3.0 * e.standard_error) if e.name == "Cm_q" else e for e in fit.parameters)
+    with pytest.raises(DivergenceError, match=r"Cm_q held at .* local minimum"):
+        profile_likelihood(replace(fit, parameters=moved), parameters(), "Cm_q")
 
 
 def test_what_cannot_be_profiled_is_refused():

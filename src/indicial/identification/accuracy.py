@@ -15,6 +15,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from indicial.conventions import Array
 
@@ -23,6 +24,9 @@ WHITE_LEVEL = 0.01
 
 _MOST_CORRELATED = 0.98
 _COLLINEAR = 30.0  # condition index from which Belsley, Kuh & Welsch speak of moderate to strong dependence
+_SHARE = 0.5  # of the variance of an estimate: what they ask for to name it
+_LINKED = 0.1  # of the projector onto what is not told: smaller entries are no link
+_TOLD = 0.1  # of the error alone: so well known a combination is worth naming
 _WEAK = 0.5  # relative standard error from which a value is called undetermined
 
 
@@ -82,8 +86,11 @@ def neighbour_test(channel: str, residuals: Array, slope: Array, bound: Array) -
 def undetermined(names: tuple[str, ...], values: Array, covariance: Array) -> tuple[str, ...]:
     """What the record cannot tell of the derivatives, in words.
 
-    Their information, what the other unknowns leave of it, is scaled to a unit diagonal; a condition index (largest
-    over smallest singular value) above 30 is reported with the derivatives that make it.
+    Their information, what the other unknowns leave of it, is scaled to a unit diagonal, with eigenvalues l_k and
+    directions v_k. Those whose condition index ``sqrt(l_max/l_k)`` is above 30 are what the record does not tell, and a
+    derivative takes part if they make more than half of its variance, ``sum_k v_jk^2/l_k`` (the variance-decomposition
+    proportions of Belsley, Kuh & Welsch). Those that go together are named together, with the combination of them that
+    the record does tell, if there is one.
 
     Parameters
     ----------
@@ -97,19 +104,33 @@ def undetermined(names: tuple[str, ...], values: Array, covariance: Array) -> tu
     information = np.linalg.pinv(covariance / np.outer(errors, errors), hermitian=True, rcond=1e-15)
     scale = np.sqrt(np.diag(information))
     powers, directions = np.linalg.eigh(information / np.outer(scale, scale))
+    powers = np.maximum(powers, np.finfo(float).tiny)
+    index = np.sqrt(powers[-1] / powers)
+    lost = index > _COLLINEAR
     findings: list[str] = []
-    dependent: set[str] = set()
-    for power, direction in zip(powers, directions.T, strict=True):
-        index = math.sqrt(powers[-1] / max(power, np.finfo(float).tiny))
-        together = [i for i in np.argsort(-np.abs(direction)) if abs(direction[i]) > 0.3]
-        if index < _COLLINEAR or len(together) < 2:
-            continue
-        dependent.update(names[i] for i in together)
-        findings.append(_dependence([names[i] for i in together], index, covariance[np.ix_(together, together)]))
-    for name, value, error in zip(names, values, errors, strict=True):
-        if name not in dependent and error > _WEAK * abs(value):
+    dependent: set[int] = set()
+    for group in _groups(directions, powers, lost):
+        dependent.update(group)
+        worst = max(index[k] for k in np.flatnonzero(lost) if np.max(np.abs(directions[group, k])) > _LINKED)
+        findings.append(_dependence([names[i] for i in group], worst, covariance[np.ix_(group, group)]))
+    for i, (name, value, error) in enumerate(zip(names, values, errors, strict=True)):
+        if i not in dependent and error > _WEAK * abs(value):
             findings.append(f"the record hardly determines {name}: {value:.4g} +- {error:.2g}")
     return tuple(findings)
+
+
+def _groups(directions: Array, powers: Array, lost: NDArray[np.bool_]) -> list[list[int]]:
+    """Which derivatives go together in what is lost, those with the largest part in it first."""
+    from scipy.sparse.csgraph import connected_components
+
+    parts = directions**2 / powers
+    taking = np.flatnonzero(parts[:, lost].sum(axis=1) > _SHARE * parts.sum(axis=1))
+    null = directions[np.ix_(taking, np.flatnonzero(lost))]
+    projector = null @ null.T
+    _, label = connected_components(np.abs(projector) > _LINKED, directed=False)
+    order = np.argsort(-np.diag(projector), kind="stable")
+    groups = [[int(taking[i]) for i in order if label[i] == number] for number in dict.fromkeys(label)]
+    return [group for group in groups if len(group) > 1]
 
 
 def _dependence(names: list[str], index: float, covariance: Array) -> str:
@@ -117,9 +138,16 @@ def _dependence(names: list[str], index: float, covariance: Array) -> str:
     listed = ", ".join(f"{name} +- {error:.2g}" for name, error in zip(names, errors, strict=True))
     text = f"the record cannot separate {' and '.join(names)} (condition index {index:.0f}; {listed})"
     if len(names) == 2:
+        text += f", correlation {covariance[0, 1] / (errors[0] * errors[1]):.5f}"
         total = math.sqrt(max(covariance.sum(), 0.0))
-        correlation = covariance[0, 1] / (errors[0] * errors[1])
-        text += f", correlation {correlation:.5f}"
-        if total < 0.1 * float(errors.min()):
-            text += f"; it determines their sum, +- {total:.2g}: identify the sum"
+        if total < _TOLD * float(errors.min()):
+            return text + f"; it determines their sum, +- {total:.2g}: identify the sum"
+    factors = -np.linalg.lstsq(covariance[1:, 1:], covariance[1:, 0], rcond=None)[0]
+    weights = np.append(1.0, factors)
+    told = math.sqrt(max(float(weights @ covariance @ weights), 0.0))
+    if told < _TOLD * errors[0]:
+        terms = "".join(
+            f" {'-' if f < 0.0 else '+'} {abs(f):.3g} {name}" for f, name in zip(factors, names[1:], strict=True)
+        )
+        text += f"; it determines {names[0]}{terms}, +- {told:.2g}"
     return text

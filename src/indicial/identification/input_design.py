@@ -44,7 +44,7 @@ class Experiment:
         With the parameters to be identified and the controls as free symbols.
     initial : InitialState
     values : mapping of str to float
-        What the parameters are believed to be.
+        What the parameters are believed to be, or the size that they may have; not 0.
     noise : mapping of str to float
         Standard deviation of each channel that will be measured; its names are `FlightRecord`'s.
     time : ndarray
@@ -305,6 +305,11 @@ class _Judge:
                 f"{stray[0]} is no free symbol of the model; there are {', '.join(experiment.dynamics.parameter_names)}"
                 if stray
                 else "an experiment needs a parameter to identify"
+            )
+        nothing = [name for name, value in experiment.values.items() if value == 0.0]
+        if nothing:
+            raise InputError(
+                f"{nothing[0]} is believed to be 0, but errors are judged in units of that: give the size it may have"
             )
         self.model = SensitivityModel.of(experiment.dynamics, tuple(experiment.noise)) if model is None else model
         self.parameters = [Parameter(name, float(value)) for name, value in experiment.values.items()]

@@ -249,25 +249,48 @@ def fit_manoeuvres(
         return _result(problem, point, noise, tuple(cost))
 
 
+@dataclass(frozen=True)
+class _Slope:
+    """A point with the rows of its linear problem and J there."""
+
+    point: _Point
+    slopes: Array
+    residuals: Array
+    cost: float
+
+    @classmethod
+    def at(cls, problem: Problem, point: _Point, noise: Noise) -> _Slope:
+        slopes, residuals = problem.system(point, noise)
+        return cls(point, slopes, residuals, 0.5 * float(residuals @ residuals))
+
+    def after(self, problem: Problem, step: Array, noise: Noise) -> _Slope | None:
+        """Where a step leads; None if nothing flies there."""
+        point = problem.look(self.point.unknowns + step, problem.moved(self.point, step))
+        return None if point is None else _Slope.at(problem, point, noise)
+
+
 def minimise(problem: Problem, point: _Point, noise: Noise, cost: list[float]) -> _Point:
-    """Damped Gauss-Newton from a point; J at the start and after each step goes into `cost`."""
-    slopes, residuals = problem.system(point, noise)
-    cost.append(0.5 * float(residuals @ residuals))
+    """Damped Gauss-Newton from a point; J at the start and after each step goes into `cost`.
+
+    A whole step that makes J larger is followed by another before it is given up: where a flight is unstable J is a
+    valley a million times steeper across than along, whose floor is curved; the second step leads back to it.
+    """
+    here = _Slope.at(problem, point, noise)
+    cost.append(here.cost)
     damping = 0.0
     for _ in range(_MAX_STEPS):
-        step, length = gauss_newton_step(slopes, residuals, damping)
-        trial = problem.look(point.unknowns + step, problem.moved(point, step))
-        if trial is not None:
-            trial_slopes, trial_residuals = problem.system(trial, noise)
-            after = 0.5 * float(trial_residuals @ trial_residuals)
-            if after <= cost[-1] or length < _SHORT:
-                point, slopes, residuals = trial, trial_slopes, trial_residuals
-                damping = 0.0 if damping < 1e-4 else damping / 10.0
-                cost.append(after)
-                log.info("output error: J = %.6g after a step of %.2g standard errors", after, length)
-                if length < _SHORT:
-                    return point
-                continue
+        step, length = gauss_newton_step(here.slopes, here.residuals, damping)
+        there = here.after(problem, step, noise)
+        if there is not None and there.cost > here.cost and damping == 0.0 and length >= _SHORT:
+            there = there.after(problem, gauss_newton_step(there.slopes, there.residuals, 0.0)[0], noise)
+        if there is not None and (there.cost <= here.cost or length < _SHORT):
+            here = there
+            damping = 0.0 if damping < 1e-4 else damping / 10.0
+            cost.append(here.cost)
+            log.info("output error: J = %.6g after a step of %.2g standard errors", here.cost, length)
+            if length < _SHORT:
+                return here.point
+            continue
         damping = max(1e-3, 10.0 * damping)
         if damping > _MAX_DAMPING:
             break

@@ -30,6 +30,7 @@ _APART = 0.1  # of the bound's half width: from here on profile and bound are sa
 _FARTHEST = 20.0  # standard errors looked at; an interval that reaches farther is open
 _CLOSE = 0.01  # of the square root of D at an end
 _TRIALS = 25
+_LOWER = 1e-2  # of D; by this much below the fit's J says that the fit was not at its least
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,8 @@ class Profile:
     level : float
         Of the interval.
     lower, upper : float
-        Its ends; infinite where the likelihood does not fall enough within 20 standard errors, or no fit converges.
+        Its ends; infinite where the likelihood does not fall enough within 20 standard errors, or where fits cease to
+        converge before it has. The lower end of a positive parameter is 0 at least.
     values, statistic : ndarray
         Points looked at, and D there, in order, shape (n,).
     """
@@ -122,6 +124,8 @@ def profile_likelihood(
     ------
     InputError
         If there is no such parameter, it has a value for each record or a prior, or the level is none.
+    DivergenceError
+        If the others fit the records better with the parameter held elsewhere: the fit was not at the least J.
     """
     if not 0.0 < level < 1.0:
         raise InputError(f"level is {level}, must be between 0 and 1")
@@ -161,35 +165,46 @@ class _Walk:
         self.seen = {self.centre: 0.0}
 
     def statistic(self, value: float) -> float:
-        """D at a value; infinite where no flight is found."""
+        """D at a value; infinite where no fit converges."""
         if value not in self.seen:
             try:
-                self.seen[value] = max(2.0 * (self._cost(value) - self.least), 0.0)
+                found = 2.0 * (self._cost(value) - self.least)
             except DivergenceError:
                 return math.inf
+            if found < -_LOWER:
+                raise DivergenceError(
+                    f"with {self.chosen.name} held at {value:.6g} J is {-0.5 * found:.3g} lower than where the fit "
+                    "ended: that was a local minimum; fit again from that value"
+                )
+            self.seen[value] = max(found, 0.0)
         return self.seen[value]
 
     def end(self, sign: float, wanted: float, error: float) -> float:
         """Where the square root of D is `wanted`, on one side: bracketed, then by false position on the root."""
-        inside, outside = 0.0, 1.1 * wanted
-        inner, outer = 0.0, math.sqrt(self.statistic(self.centre + sign * outside * error))
-        while outer < wanted:
+
+        def root(away: float) -> float:
+            return math.sqrt(self.statistic(self.centre + sign * away * error))
+
+        wall = self.centre / error if self.chosen.positive and sign < 0.0 else math.inf
+        farthest = min(_FARTHEST, (1.0 - _CLOSE) * wall)
+        inside, inner = 0.0, 0.0
+        outside = min(1.1 * wanted, farthest)
+        while (outer := root(outside)) < wanted:
+            if outside >= farthest:
+                return 0.0 if farthest < _FARTHEST else sign * math.inf
             inside, inner = outside, outer
-            outside *= 1.6
-            if outside > _FARTHEST or (self.chosen.positive and self.centre + sign * outside * error <= 0.0):
-                return sign * math.inf if sign > 0.0 or not self.chosen.positive else 0.0
-            outer = math.sqrt(self.statistic(self.centre + sign * outside * error))
+            outside = min(1.6 * outside, farthest)
         for _ in range(_TRIALS):
             share = (wanted - inner) / (outer - inner) if math.isfinite(outer) else 0.5
             trial = inside + min(max(share, 0.05), 0.95) * (outside - inside)
-            found = math.sqrt(self.statistic(self.centre + sign * trial * error))
+            found = root(trial)
             if abs(found - wanted) < _CLOSE * wanted:
                 return self.centre + sign * trial * error
             if found < wanted:
                 inside, inner = trial, found
             else:
                 outside, outer = trial, found
-        return self.centre + sign * inside * error
+        return self.centre + sign * outside * error if math.isfinite(outer) else sign * math.inf
 
     def _cost(self, value: float) -> float:
         """Least J with the parameter held; begins where the fit ended."""
