@@ -43,6 +43,11 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def why(error: Exception) -> str:
+    """What an error says, without the number and name that the system's errors repeat."""
+    return (error.strerror if isinstance(error, OSError) else None) or str(error)
+
+
 def write_text(path: str | Path, text: str) -> None:
     """Write `text` to `path` in one step."""
     with atomic_path(path) as temporary:
@@ -71,7 +76,7 @@ def read_csv(path: str | Path) -> tuple[dict[str, str], dict[str, NDArray[np.flo
     try:
         lines = Path(path).read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a readable CSV file ({error})") from error
+        raise InputError(f"{path}: not a readable CSV file ({why(error)})") from error
     header = dict(line[2:].split(": ", 1) for line in lines if line.startswith("# ") and ": " in line)
     rows = list(csv.reader(line for line in lines if line.strip() and not line.startswith("#")))
     if len(rows) < 2:
@@ -96,7 +101,7 @@ def parse_json(path: str | Path) -> Any:
     try:
         return json.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise InputError(f"{path}: not a readable JSON file ({error})") from error
+        raise InputError(f"{path}: not a readable JSON file ({why(error)})") from error
 
 
 def read_json(path: str | Path, format_: str, version: int) -> dict[str, Any]:

@@ -197,3 +197,18 @@ def test_a_wrong_file_is_refused_in_one_line(tmp_path, wrong: tuple[str, str], w
         read_aircraft(path)
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_note_is_told_and_written_and_long_names_keep_their_columns():
+    file = find_aircraft("boeing_747")
+    own, slow = damping_of_aircraft(file, mach=0.8), damping_of_aircraft(file, mach=0.5)
+    assert own.notes == ()
+    assert slow.notes == ("derivatives are those of Mach 0.8, held at Mach 0.5",)
+    assert slow.notes[0] in slow.summary()
+    assert slow.to_dict()["notes"] == list(slow.notes)
+    # in the table of modes no number touches its neighbour, however long a mode's name is
+    rows = slow.summary().splitlines()[3 : 3 + len(slow.modes)]
+    for row, one in zip(rows, slow.modes, strict=True):
+        numbers = row.removeprefix(f"  {one.mode.name}").split()[:7]
+        assert float(numbers[0]) == pytest.approx(one.mode.damping, rel=1e-4)
+        assert float(numbers[4]) == pytest.approx(one.mode.damping_ratio, rel=1e-3)

@@ -194,7 +194,7 @@ def test_a_lost_stage_is_made_again_from_kept_experiments(run):
 
 
 def test_a_stage_says_what_it_misses(tmp_path):
-    with pytest.raises(InputError, match=r"fom\.json: not there yet; run the stage 'fom' first"):
+    with pytest.raises(InputError, match=r"fom\.json: not there yet; run `indicial derive --method fom` first"):
         run_stages(quick_case(), RunFolder(tmp_path), ("rom",), make_factory=make_oracle)
 
 

@@ -54,7 +54,15 @@ def test_wrong_input_gives_one_line_and_exit_code_2(tmp_path):
         ): "'magic' is not one of 'mrf', 'fom', 'irm', 'operator', 'all'",
         ("bogus",): "No such command 'bogus'",
         ("damping", "nothing"): "packaged aircraft: boeing_747.toml",
-        ("damping", "basic_finner_quick"): "not there yet",
+        ("damping", "basic_finner_quick"): "run `indicial derive --method irm` first",
+        ("damping", "boeing_747", "--json", "folder"): "folder is a folder; --json must name a file",
+        ("damping", "boeing_747", "--json", "typo.toml/j.json"): "typo.toml is a file; --json cannot be in it",
+        ("damping", "boeing_747", "--figures", "typo.toml"): "typo.toml is a file; --figures must name a folder",
+        ("flights", "a.nc", "b.nc", "--csv", "folder"): "folder is a folder; --csv must name a file",
+        ("study", "range", "--figures", "typo.toml"): "typo.toml is a file; --figures must name a folder",
+        ("study", "range", "--check", "--folder", "typo.toml"): "typo.toml is a file; --folder must name a folder",
+        ("rom", "expor", "model.json"): "No such command 'expor'. Did you mean 'export'? (see indicial rom --help)",
+        ("rom", "build", "--map", "nothing.toml"): "nothing.toml: cannot be read (No such file or directory)",
         ("damping", "boeing_747", "--mach", "-1"): "Mach number is -1.0, must be positive",
         ("damping", "boeing_747", "--roll-rate", "3"): "--roll-rate is for missiles",
         ("damping", "boeing_747", "--altitude", "1e6"): "altitude must be within",
@@ -96,7 +104,7 @@ def test_rom_is_a_stage_or_a_command_on_model_files(tmp_path):
     assert (done.exit_code, "model.nc" in done.stdout) == (0, True)
     assert StateSpaceModel.from_netcdf(tmp_path / "model.nc").to_dict() == model.to_dict()
     wrong = {
-        ("rom",): "Missing argument 'CASE'",
+        ("rom",): "Missing argument 'CASE'. (see indicial rom --help)",
         ("rom", "nothing.toml"): "no such case file",
         ("rom", "export", "nothing.json", "--to", "c", "-o", "x.c"): "nothing.json",
         (*arguments, "excel"): " is not one of " + ", ".join(f"'{name}'" for name in FORMATS),

@@ -117,6 +117,6 @@ def _bounds(metadata: list[Any]) -> Iterator[str]:
             case MultipleOf(multiple_of=value):
                 yield f"in steps of {value:g}"
             case MinLen(min_length=value):
-                yield f"of {value} letters or more"
+                yield f"of at least {value} {'letter' if value == 1 else 'letters'}"
             case MaxLen(max_length=value):
-                yield f"of {value} letters or fewer"
+                yield f"of at most {value} letters"

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ValidationError
 from indicial.case.describe import allowed, field_at, known_keys
 from indicial.case.model import Case
 from indicial.errors import InputError
+from indicial.files import why
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -43,8 +44,7 @@ def read_text(path: str | Path) -> str:
     try:
         return Path(path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise InputError(f"{path}: cannot be read ({reason})") from error
+        raise InputError(f"{path}: cannot be read ({why(error)})") from error
 
 
 def parse(model: type[M], text: str, name: str) -> M:

@@ -25,10 +25,12 @@ def main() -> None:
     """Run the command line: exit code 0 if all went well, 2 for bad input, 1 for a failure of the work itself."""
     try:
         # By itself typer draws a box of several lines round a wrong option.
-        sys.exit(app(standalone_mode=False))
+        sys.exit(app(standalone_mode=False, prog_name="indicial"))
     except _UsageError as error:
         message = error.format_message()
-        _fail(f"{message} (see {error.ctx.command_path} --help)" if message and error.ctx else message, error.exit_code)
+        # `rom stage` is what `rom` does with a case: nobody types it
+        hint = f" (see {error.ctx.command_path.removesuffix(' stage')} --help)" if message and error.ctx else ""
+        _fail(f"{message}{hint}", error.exit_code)
     except typer.Abort as error:
         # The parser takes an unexpected end of file for a closed terminal.
         if isinstance(error.__cause__, EOFError):

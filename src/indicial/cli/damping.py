@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from indicial.cli.commands import app
+from indicial.cli.outputs import FiguresFolder, JsonFile
 
 if TYPE_CHECKING:
     from indicial.flightsim import AircraftDamping, MissileDamping
@@ -29,8 +30,6 @@ Altitude = Annotated[
     float | None,
     typer.Option(help="Geometric altitude in the standard atmosphere [m]; the source's air if not given."),
 ]
-Json = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write every number into a file.")]
-Figures = Annotated[Path | None, typer.Option(metavar="DIR", help="Draw figures into a folder.")]
 
 
 @app.command(
@@ -42,8 +41,8 @@ def damping(
     roll_rate: Roll = None,
     mach: Mach = None,
     altitude: Altitude = None,
-    json_file: Json = None,
-    figures: Figures = None,
+    json_file: JsonFile = None,
+    figures: FiguresFolder = None,
 ) -> None:
     """Modes and their damping: linear model, decay of a flight, closed form; what it is made of; and a verdict.
 
@@ -60,11 +59,8 @@ def damping(
         write_text(json_file, json.dumps(found.to_dict(), indent=1, allow_nan=False))
         typer.echo(f"written: {json_file}")
     if figures is not None:
-        from indicial.errors import InputError
         from indicial.report.style import figure_style, save
 
-        if figures.is_file():
-            raise InputError(f"{figures} is a file; --figures must name a folder")
         with figure_style():
             for name, figure in found.plot().items():
                 typer.echo(f"figure: {save(figure, figures / f'{name}.png')}")

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from indicial.cli.commands import app
+from indicial.cli.outputs import FiguresFolder, JsonFile, to_file
 
 
 class Align(enum.StrEnum):
@@ -18,7 +19,7 @@ class Align(enum.StrEnum):
     STATION = "station"
 
 
-Flight = Annotated[Path, typer.Argument(help="A trajectory's file: `.nc`, `.csv` or `.parquet`.")]
+_FILE = "A trajectory's file: `.nc`, `.csv` or `.parquet`."
 
 
 @app.command(
@@ -26,16 +27,15 @@ Flight = Annotated[Path, typer.Argument(help="A trajectory's file: `.nc`, `.csv`
     "runs/basic_finner_quick/histories/flight_rom.nc --align station --figures figures`"
 )
 def flights(
-    first: Flight,
-    second: Flight,
+    first: Annotated[Path, typer.Argument(metavar="A", help=_FILE)],
+    second: Annotated[Path, typer.Argument(metavar="B", help=_FILE)],
     align: Annotated[Align, typer.Option(help="Compare at the same times, or at the same stations x.")] = Align.TIME,
-    json_file: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Write every number into a file.")
-    ] = None,
+    json_file: JsonFile = None,
     csv_file: Annotated[
-        Path | None, typer.Option("--csv", metavar="FILE", help="Write the differences at every instant.")
+        Path | None,
+        typer.Option("--csv", metavar="FILE", help="Write the differences at every instant.", callback=to_file),
     ] = None,
-    figures: Annotated[Path | None, typer.Option(metavar="DIR", help="Draw figures into a folder.")] = None,
+    figures: FiguresFolder = None,
 ) -> None:
     """Compare two flights: position, angles, swerve, phase, and the damping of both arms."""
     import json

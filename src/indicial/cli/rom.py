@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import enum
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,16 +11,25 @@ import typer
 from typer.core import TyperGroup
 
 from indicial.cli.commands import Output, Target, Verbose, app, perform
+from indicial.cli.outputs import to_file
 
 
 class StageOrCommand(TyperGroup):
     """A group whose arguments are those of its command `stage` when they do not begin with a command's name."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Put `stage` where no command is named."""
+        """Put `stage` where no command is named, and refuse what is nearly a command's name."""
         if args[:1] != ["--help"] and (not args or args[0] not in self.commands):
+            self._refuse_misspelt(ctx, args)
             args = ["stage", *args]
         return super().parse_args(ctx, args)
+
+    def _refuse_misspelt(self, ctx: Any, args: list[str]) -> None:
+        """A case would be called so only if it were there."""
+        shown = [name for name in self.commands if name != "stage"]
+        near = difflib.get_close_matches(args[0], shown, n=1) if args else []
+        if near and not Path(args[0]).exists():
+            ctx.fail(f"No such command '{args[0]}'. Did you mean '{near[0]}'?")
 
 
 rom = typer.Typer(
@@ -58,7 +68,9 @@ def stage(case: Target, output: Output = None, verbose: Verbose = False) -> None
 def export(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="A model's file, `.json` or `.nc`.")],
     to: Annotated[Format, typer.Option("--to", help="For which program.")],
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="The file to write.")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="FILE", help="The file to write.", callback=to_file)
+    ],
     sources_only: Annotated[
         bool, typer.Option("--sources-only", help="Do not compile an FMU: whoever imports it does.")
     ] = False,

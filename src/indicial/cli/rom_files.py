@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from indicial.cli.outputs import to_file, to_folder
 from indicial.cli.rom import rom
 
 if TYPE_CHECKING:
@@ -32,7 +33,10 @@ def build(
     ] = None,
     map_file: Map = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="DIR", help="Where to write; `runs/NAME` if not given.")
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="DIR", help="Where to write; `runs/NAME` if not given.", callback=to_folder
+        ),
     ] = None,
     compare: Annotated[
         bool,
@@ -76,7 +80,8 @@ def check(
     map_file: Map = None,
     since: Annotated[float, typer.Option(help="Reduced time 2Vt/c from which to compare.")] = 0.0,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="PNG", help="Draw them; with several, numbered.")
+        Path | None,
+        typer.Option("--output", "-o", metavar="PNG", help="Draw them; with several, numbered.", callback=to_file),
     ] = None,
 ) -> None:
     """A model's prediction beside histories it has not seen, in words and in a figure."""

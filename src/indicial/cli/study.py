@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from indicial.cli.commands import app
+from indicial.cli.outputs import to_folder
 
 if TYPE_CHECKING:
     from indicial.studies import Study
@@ -26,10 +27,19 @@ Check = Annotated[
     bool, typer.Option("--check", help="Set every asked figure beside its target, from kept results only.")
 ]
 Keep = Annotated[
-    str | None, typer.Option(metavar="DIR", help="Gather what is computed into a folder, such as data/studies/finner.")
+    Path | None,
+    typer.Option(
+        metavar="DIR", help="Gather what is computed into a folder, such as data/studies/finner.", callback=to_folder
+    ),
 ]
-Figures = Annotated[str | None, typer.Option(metavar="DIR", help="Draw the figures of the kept results into a folder.")]
-Folder = Annotated[str | None, typer.Option("--folder", metavar="DIR", help="Work folder; runs/STUDY if not given.")]
+Figures = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="Draw the figures of the kept results into a folder.", callback=to_folder),
+]
+Folder = Annotated[
+    Path | None,
+    typer.Option("--folder", metavar="DIR", help="Work folder; runs/STUDY if not given.", callback=to_folder),
+]
 Workers = Annotated[int, typer.Option("--workers", "-w", min=1, help="Pieces computed at a time.")]
 
 
@@ -56,18 +66,18 @@ def study(
     chosen = find_study(name)
     if not (compute or recompute or check or keep or figures):
         raise InputError("nothing to do: give --compute, --recompute, --check, --keep or --figures")
-    work = Path(folder) if folder is not None else Path("runs") / name
+    work = folder if folder is not None else Path("runs") / name
     code = 0
     if compute:
         code |= _compute(chosen, compute, work, workers)
     if keep:
-        _keep(chosen, work, Path(keep))
+        _keep(chosen, work, keep)
     if recompute:
         code |= _recompute(chosen, recompute, workers)
     if check:
         code |= _check(chosen)
     if figures:
-        _figures(chosen, Path(figures))
+        _figures(chosen, figures)
     if code:
         raise typer.Exit(code)
 
@@ -109,13 +119,13 @@ def _recompute(study: Study, subset: str, workers: int) -> int:
 
 
 def _check(study: Study) -> int:
+    from indicial.studies.claim import summarise
     from indicial.studies.kept import Results
 
     results = Results.kept(study.name, study.pieces)
     typer.echo(f"{study.title}: {len(results)} of {len(study.pieces)} pieces are kept")
     claims = study.claims(results)
-    for claim in claims:
-        typer.echo(claim.summary())
+    typer.echo(summarise(claims))
     return 0 if all(claim.holds for claim in claims) else 1
 
 

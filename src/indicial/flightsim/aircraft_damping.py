@@ -120,6 +120,8 @@ class AircraftDamping:
     all_modes : Modes
     modes : tuple of ModeDamping
     qualities : HandlingQualities
+    notes : tuple of str
+        What the reader must know of the derivatives.
     """
 
     steady: Trim
@@ -127,6 +129,7 @@ class AircraftDamping:
     all_modes: Modes
     modes: tuple[ModeDamping, ...]
     qualities: HandlingQualities
+    notes: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> ModeDamping:
         for one in self.modes:
@@ -137,10 +140,12 @@ class AircraftDamping:
     def summary(self) -> str:
         """Modes three ways, what their damping is made of, and the levels."""
         name, speed = self.steady.dynamics.vehicle.name, self.steady.variables["speed"]
+        width = max(12, *(len(one.mode.name) for one in self.modes)) + 2
         lines = [
             f"{name}: modes at {speed:.5g} m/s, Mach {self.steady.outputs['mach']:.3g}",
-            f"  {'mode':<14}{'damping':>11}{'fitted':>11}{'closed form':>12}{'frequency':>11}{'ratio':>9}{'+-':>9}"
-            "  halves/doubles",
+            *(f"  note: {note}" for note in self.notes),
+            f"  {'mode':<{width}}{'damping':>11}{'fitted':>11}{'closed form':>12}{'frequency':>11}{'ratio':>11}"
+            f"{'+-':>8}  halves/doubles",
         ]
         for one in self.modes:
             m = one.mode
@@ -148,20 +153,20 @@ class AircraftDamping:
             time = f"doubles in {m.time_to_double:.3g} s" if m.damping > 0.0 else f"halves in {m.time_to_half:.3g} s"
             error = f"{one.ratio_standard_error:.2g}" if one.uncertainties else "-"
             lines.append(
-                f"  {m.name:<14}{m.damping:>11.5g}{fitted:>11}{few:>12}{m.frequency:>11.5g}{m.damping_ratio:>9.4g}"
-                f"{error:>9}  {time}"
+                f"  {m.name:<{width}}{m.damping:>11.5g}{fitted:>11}{few:>12}{m.frequency:>11.5g}"
+                f"{m.damping_ratio:>11.4g}{error:>8}  {time}"
             )
         lines.append("  damping and frequency in 1/s and rad/s; what the damping is made of, derivative by derivative:")
         for one in self.modes:
             size = max(abs(one.mode.damping), max(map(abs, one.parts.values()), default=0.0))
             told = [f"{name} {part:+.3g}" for name, part in one.parts.items() if abs(part) > _SMALL_PART * size]
-            lines.append(f"  {one.mode.name:<14}{', '.join(told)}")
+            lines.append(f"  {one.mode.name:<{width}}{', '.join(told)}")
         lines.append("  and what the damping ratio changes with, for a tenth more of each derivative:")
         for one in self.modes:
             if one.mode.frequency:
                 steps = {name: 0.1 * one.values[name] * slope for name, slope in one.ratio_gradient.items()}
                 told = sorted((name for name in steps if abs(steps[name]) > 1e-4), key=lambda name: -abs(steps[name]))
-                lines.append(f"  {one.mode.name:<14}{', '.join(f'{name} {steps[name]:+.2g}' for name in told)}")
+                lines.append(f"  {one.mode.name:<{width}}{', '.join(f'{name} {steps[name]:+.2g}' for name in told)}")
         return "\n".join([*lines, self.qualities.summary()])
 
     def to_dict(self) -> dict[str, Any]:
@@ -174,6 +179,7 @@ class AircraftDamping:
             "speed_m_s": v["speed"],
             "altitude_m": v["altitude"],
             "mach": self.steady.outputs["mach"],
+            "notes": list(self.notes),
             "modes": [one.to_dict() for one in self.modes],
             "handling_qualities": {
                 "specification": "MIL-F-8785C",
@@ -218,6 +224,7 @@ def aircraft_damping(
     path_angle: float = 0.0,
     gravity: float = FlatEarth().g,
     uncertainties: Mapping[str, float] | None = None,
+    notes: tuple[str, ...] = (),
 ) -> AircraftDamping:
     """Modes, damping and levels of an aircraft given by derivatives in stability axes.
 
@@ -239,6 +246,8 @@ def aircraft_damping(
         [m/s^2].
     uncertainties : mapping, optional
         Standard errors of derivatives by name.
+    notes : tuple of str
+        What the reader must know of the derivatives.
 
     Raises
     ------
@@ -268,7 +277,7 @@ def aircraft_damping(
         for mode, gradient in ((m, dict(zip(values, _gradient(linear.a, m, slopes), strict=True))) for m in modes.modes)
     ]
     qualities = rate_modes(aircraft_class, category, modes, n_alpha=n_alpha if n_alpha > 0.0 else None)
-    return AircraftDamping(linear.trim, linear, modes, tuple(made), qualities)
+    return AircraftDamping(linear.trim, linear, modes, tuple(made), qualities, notes)
 
 
 def balanced_flight(

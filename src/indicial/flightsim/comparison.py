@@ -180,8 +180,8 @@ class TrajectoryComparison:
             axes[4].plot(x, np.degrees(self.phase_difference[:, k]), style, label=name)
         axes[0].set(ylabel="alpha [deg]")
         axes[1].set(ylabel="beta [deg]")
-        axes[2].set(ylabel="difference of position [m]")
-        axes[3].set(ylabel="difference of swerve [m]")
+        axes[2].set(ylabel="position, second less first [m]")
+        axes[3].set(ylabel="swerve, second less first [m]")
         axes[4].set(xlabel="x [m]", ylabel="second leads by [deg]")
         for axis in axes:
             axis.legend(fontsize="small")

@@ -89,7 +89,8 @@ class ModeSweep:
                 continue
             worst = np.unravel_index(int(np.nanargmax(real)), real.shape)
             value = self[name][worst]
-            grows = f", grows at {int(np.nansum(real > 0.0))} points" if np.any(real > 0.0) else ""
+            growing = np.count_nonzero(real > 0.0)
+            grows = f", grows at {growing} of {np.count_nonzero(np.isfinite(real))} points" if growing else ""
             lines.append(
                 f"  {name:<14} least damped at Mach {self.machs[worst[1]]:g}, {self.altitudes[worst[0]]:g} m: "
                 f"{value.real:.4g} 1/s, {abs(value.imag):.4g} rad/s, ratio {-value.real / abs(value):.3g}{grows}"

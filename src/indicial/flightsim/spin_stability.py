@@ -109,7 +109,7 @@ class SpinStability:
         verdict = "dynamically stable" if self.dynamically_stable else "dynamically UNSTABLE"
         lines = [
             f"{static}, {verdict} at {self.speed:.5g} m/s, roll rate {self.roll_rate:.4g} rad/s",
-            f"  Sg {self.gyroscopic:.4g}, Sd {self.dynamic:.4g}, Sd(2 - Sd) {self.dynamic * (2 - self.dynamic):.4g}",
+            f"  Sg {self.gyroscopic:z.4g}, Sd {self.dynamic:.4g}, Sd(2 - Sd) {self.dynamic * (2 - self.dynamic):.4g}",
         ]
         return "\n".join([*lines, *(f"  warning: {line}" for line in self.warnings)])
 

@@ -33,7 +33,7 @@ def plot_path(flight: Trajectory, bodies: int = _BODIES) -> Figure:
     spans = np.maximum(spans, 0.02 * np.max(spans))
     middle = np.array([np.mean([v.min(), v.max()]) for v in (x, y, height)])
     floor = float(middle[2] - 0.62 * spans[2])
-    axes.plot(x, y, np.full_like(x, floor), color="0.75", linewidth=1.0, label="shadow")
+    axes.plot(x, y, np.full_like(x, floor), color="0.4", linestyle=":", linewidth=1.5, label="shadow")
     at = np.unique(np.linspace(0, len(flight) - 1, bodies).astype(int))
     turned = matrix_from_quaternion(flight.quaternion[at])
     for k, (name, colour) in enumerate(_AXES):

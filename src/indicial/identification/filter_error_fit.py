@@ -80,7 +80,8 @@ class FilterErrorFit:
     def summary(self) -> str:
         """Estimates with standard errors, what the records cannot tell, and whether innovations are white."""
         count = sum(int(np.count_nonzero(np.isfinite(m))) for m in self.measured)
-        lines = [f"filter error: {len(self.measured)} records, {count} measurements, {len(self.cost)} steps"]
+        records = f"{len(self.measured)} {'record' if len(self.measured) == 1 else 'records'}"
+        lines = [f"filter error: {records}, {count} measurements, {len(self.cost)} steps"]
         lines += [f"  {e.summary()}" for e in self.estimates]
         lines += [f"  {text}" for text in self.findings]
         return "\n".join([*lines, *(f"  record {k}: {f.consistency().summary()}" for k, f in enumerate(self.filters))])

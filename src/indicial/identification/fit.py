@@ -194,7 +194,8 @@ class OutputErrorFit:
     def summary(self) -> str:
         """Parameters with standard errors, noise, and what the records cannot tell."""
         count = sum(int(np.count_nonzero(np.isfinite(r))) for r in self.residuals)
-        lines = [f"output error: {len(self.manoeuvres)} records, {count} measurements, {len(self.cost)} steps"]
+        records = f"{len(self.manoeuvres)} {'record' if len(self.manoeuvres) == 1 else 'records'}"
+        lines = [f"output error: {records}, {count} measurements, {len(self.cost)} steps"]
         lines += [f"  {estimate.summary()}" for estimate in self.parameters]
         for channel, factor in self.noise.items():
             memory = self.memory[channel]

@@ -63,9 +63,7 @@ def damping_of_run(
     speed = case.flight_condition.speed
     if mach is not None or altitude is not None:
         speed = _positive(case.condition.mach if mach is None else mach) * float(air_at(air, height).speed_of_sound)
-    notes = ["uncertainties are those of the methods (amplitude, scatter, quadrature), not of mesh and gas model"]
-    if mach is not None and mach != case.condition.mach:
-        notes.append(f"derivatives and model are those of Mach {case.condition.mach:g}, held at Mach {mach:g}")
+    about = "uncertainties are those of the methods (amplitude, scatter, quadrature), not of mesh and gas model"
     known = {r.name: r.uncertainty for r in flown_derivatives(context) if r.uncertainty is not None}
     return missile_damping(
         body,
@@ -76,7 +74,7 @@ def damping_of_run(
         atmosphere=air,
         altitude=height,
         uncertainties={name: error for name, error in known.items() if name in NAMES},
-        notes=tuple(notes),
+        notes=(about, *_held(mach, case.condition.mach)),
     )
 
 
@@ -102,8 +100,9 @@ def damping_of_aircraft(
     own = ConstantAtmosphere(here.temperature_K, here.density_kg_m3 * GAS_CONSTANT * here.temperature_K)
     air, height = _air(altitude, own)
     speed = here.speed_m_s
+    own_mach = speed / float(air_at(own, 0.0).speed_of_sound)
     if mach is not None or altitude is not None:
-        number = speed / float(air_at(own, 0.0).speed_of_sound) if mach is None else _positive(mach)
+        number = own_mach if mach is None else _positive(mach)
         speed = number * float(air_at(air, height).speed_of_sound)
     return aircraft_damping(
         file.vehicle,
@@ -116,6 +115,7 @@ def damping_of_aircraft(
         path_angle=math.radians(here.path_angle_deg),
         gravity=here.gravity_m_s2,
         uncertainties=file.uncertainties,
+        notes=_held(mach, own_mach),
     )
 
 
@@ -143,6 +143,13 @@ def _moved(file: AircraftFile, speed: float, density: float) -> BodyAxisAerodyna
     lift = here.density_kg_m3 * here.speed_m_s**2 / (density * speed**2)
     loads = file.aerodynamics(speed)
     return replace(loads, CX_alpha=lift * loads.CX_alpha)
+
+
+def _held(mach: float | None, own: float) -> tuple[str, ...]:
+    """What must be known of derivatives that are flown at another Mach number than their own."""
+    if mach is None or abs(mach - own) < 5e-3:  # as files round it
+        return ()
+    return (f"derivatives are those of Mach {own:.3g}, held at Mach {mach:g}",)
 
 
 def _positive(mach: float) -> float:

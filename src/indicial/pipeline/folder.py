@@ -11,9 +11,10 @@ from typing import Any
 from indicial import __version__
 from indicial.case import Case, parse_case
 from indicial.errors import InputError
-from indicial.files import write_text
+from indicial.files import why, write_text
 
 CASE_FILE = "case.toml"
+_METHODS = ("mrf", "fom", "irm", "operator")
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,8 @@ class RunFolder:
         """
         path = self.path / f"{stage}.json"
         if not path.is_file():
-            raise InputError(f"{path}: not there yet; run the stage {stage!r} first, or all with `indicial run`")
+            command = f"derive --method {stage}" if stage in _METHODS else stage
+            raise InputError(f"{path}: not there yet; run `indicial {command}` first, or all with `indicial run`")
         try:
             content = json.loads(path.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
@@ -147,7 +149,7 @@ def _read(file: Path) -> str:
     try:
         return file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{file}: cannot be read ({error})") from error
+        raise InputError(f"{file}: cannot be read ({why(error)})") from error
 
 
 def digest(*parts: Any) -> str:

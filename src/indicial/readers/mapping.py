@@ -48,6 +48,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from indicial.conventions import ReferenceQuantities
 from indicial.errors import InputError
+from indicial.files import why
 from indicial.motion import FlightCondition
 from indicial.readers.axes import FRAMES
 from indicial.readers.registry import FORMATS
@@ -225,7 +226,7 @@ def read_mapping(path: str | Path) -> Mapping:
     try:
         content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read ({error})") from error
+        raise InputError(f"{path}: cannot be read ({why(error)})") from error
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: not valid TOML: {error}") from error
     return parse_mapping(content, str(path))

@@ -58,11 +58,13 @@ class Claim:
             return "FALLS SHORT"
         return "reported" if self.target is None else "holds"
 
-    def summary(self) -> str:
-        """One line."""
+    def summary(self, width: int = 66) -> str:
+        """One line, with so many places for the name."""
         detail = "; ".join(part for part in (self.worst, self.note) if part)
-        value, target = self._shown(self.value, 2), self._shown(self.target, 0)
-        return f"{self.name:<66} {value:>9}  at most {target:>6}  {self.verdict:<12}  {detail}".rstrip()
+        target = "" if self.target is None else f"at most {self._shown(self.target, 0)}"
+        return (
+            f"{self.name:<{width}} {self._shown(self.value, 2):>9}  {target:<14}  {self.verdict:<12}  {detail}".rstrip()
+        )
 
     def _shown(self, value: float | None, digits: int) -> str:
         if value is None:
@@ -72,6 +74,12 @@ class Claim:
         if digits == 0:
             return f"{100.0 * value:.3g}%"
         return f"{value:.{digits}%}" if value >= 1e-3 or value == 0.0 else f"{100.0 * value:.1g}%"
+
+
+def summarise(claims: Sequence[Claim]) -> str:
+    """One line for each claim, in columns."""
+    width = max((len(claim.name) for claim in claims), default=0)
+    return "\n".join(claim.summary(width) for claim in claims)
 
 
 def relative_rms(name: str, target: float | None, mach: Sequence[float], found: Array, wanted: Array) -> Claim:

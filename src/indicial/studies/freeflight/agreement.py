@@ -7,6 +7,9 @@ from indicial.studies.freeflight.pieces import ANGLES, FLIGHTS
 from indicial.studies.kept import Results
 from indicial.studies.piece import PieceResult
 
+SIGNED = ("damping", "phase_deg")
+"""Of these it matters which of the two has more; the others are sizes of a difference."""
+
 WHAT = {
     "incidence": ("angle of attack, rms of the difference over rms", "%", 1.0),
     "damping": ("damping", "%", 1.0),
@@ -34,7 +37,8 @@ def _difference(shot: PieceResult | None, angle: float, name: str, key: str) -> 
     if shot is None:
         return Claim(title, None, None, unit=unit)
     value = shot.provenance["against_flow"][name][key] * factor
-    return Claim(title, abs(value), None, "more" if value > 0 else "less", unit=unit)
+    shown = f"{value:+.2%}" if unit == "%" else f"{value:+.2f} {unit}"
+    return Claim(title, abs(value), None, shown if key in SIGNED else "", unit=unit)
 
 
 def _time_step(first: PieceResult | None, doubled: PieceResult | None) -> list[Claim]:

@@ -16,6 +16,7 @@ from indicial.studies.range.pieces import NAMES
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_SEEN = {"exact": "exactly seen", "seen": "range noise"}
 _COLUMNS = {"linear": (SKY, "v"), "single": (ORANGE, "s"), "multiple": (BLUE, "o")}
 
 
@@ -127,7 +128,8 @@ def _in_flow(result: PieceResult, closing: list[PieceResult], plt: Any) -> Figur
         value, error = row[DAMPING]
         bar = SURE * error if name.startswith("seen") else 0.0
         axes.errorbar(value, len(labels), xerr=bar, fmt="o", color=BLUE, capsize=3)
-        labels.append(f"identified: {name}")
+        seen, _, flights = name.partition(", ")
+        labels.append(f"identified, {_SEEN[seen]}: {flights}")
     for method, values in result.provenance["cfd"].items():
         if DAMPING in values:
             axes.plot(values[DAMPING], len(labels), "s", color=ORANGE)
