@@ -107,7 +107,8 @@ def _implied(result: PieceResult, closing: list[PieceResult], plt: Any) -> Figur
     axes[0].set_xticks(yaws, [f"{yaw:g}" for yaw in yaws])
     axes[0].minorticks_off()
     axes[0].set_yticks([0.5, 1, 2, 5, 10, 20, 50], ["0.5", "1", "2", "5", "10", "20", "50"])
-    axes[0].legend(fontsize=7, ncols=2)
+    axes[0].set_ylim(top=5.0 * axes[0].get_ylim()[1])  # room for the legend
+    axes[0].legend(fontsize=7, ncols=3, loc="upper center")
     noise = implied_noise(result)
     axes[1].plot(list(noise), list(noise.values()), "o", color=BLUE)
     axes[1].axhline(0.1, color=GREY, lw=0.8, label="assumed")
