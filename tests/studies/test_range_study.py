@@ -1,6 +1,7 @@
 """The range study: its kept results are complete and its figures hold, and the yaw it flies is the yaw it asks for."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,9 +9,9 @@ import pytest
 from indicial.reference_data import read_table
 from indicial.studies.kept import Results
 from indicial.studies.range import STUDY
-from indicial.studies.range.agreement import closing_arrays, implied_noise
+from indicial.studies.range.agreement import DAMPING, closing_arrays, implied_noise
 from indicial.studies.range.computing import damping_error, group_flights, published, shot
-from indicial.studies.range.pieces import PIECES, groups
+from indicial.studies.range.pieces import LEAST_YAW, PIECES, groups
 
 KEPT = Results.kept("range", STUDY.pieces)
 
@@ -82,3 +83,19 @@ def test_a_group_is_recovered_again_as_it_was_kept() -> None:
     kept = KEPT.select(method="closing").at(piece.mach)
     assert kept is not None
     np.testing.assert_allclose(again.provenance["errors"], kept.provenance["errors"], rtol=1e-4, atol=1e-6)
+
+
+def test_the_page_says_what_is_kept() -> None:
+    """The table of three reductions at M 2.718, and how errors reported compare with the scatter."""
+    page = (Path(__file__).resolve().parents[2] / "docs" / "studies" / "range.md").read_text(encoding="utf-8")
+    group = next(r for r in KEPT.select(method="closing") if r.piece.mach == 2.718)
+    told: dict[str, list[str]] = {}
+    for row in group.provenance["columns"]:
+        told.setdefault(row["shot"], []).append(f"{row[DAMPING]:.0f} ({row[f'{DAMPING}_pe_pct']:.2g}%)")
+    for shot_name, (mach, yaw) in zip(("shot 1", "shot 2", "shot 3"), groups()[2.718], strict=True):
+        shown = 0.0 if yaw == LEAST_YAW else yaw
+        assert f"| M {mach:g} | {shown:.1f} | {' | '.join(told[shot_name])} | |" in page
+    assert f"| all | | | | {told['all'][0]} |" in page
+    errors, reported = closing_arrays(list(KEPT.select(method="closing")))
+    ratio = 1.0 / np.sqrt(np.mean((errors / reported) ** 2, axis=(0, 1)))
+    assert f"| {ratio.min():.2f} to {ratio.max():.2f} | 0.85 to 1.15 |" in page
