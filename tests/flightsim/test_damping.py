@@ -174,3 +174,8 @@ def test_check_is_drawn() -> None:
 
     assert len(check_damping(FINNER, derivative_model(), SPEED, roll_rate=1000.0, wavelengths=2.0).plot().axes) == 2
     plt.close("all")
+
+
+def test_a_roll_too_quick_to_be_flown_is_refused_by_its_name() -> None:
+    with pytest.raises(InputError, match=r"at a roll rate of 1e\+07 rad/s takes .* steps, at most 20000000 are flown"):
+        check_damping(FINNER, derivative_model(), SPEED, roll_rate=1e7)

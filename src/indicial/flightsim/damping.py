@@ -32,7 +32,7 @@ from indicial.flightsim.earth import FlatEarth
 from indicial.flightsim.epicycle import EpicyclicFit, fit_trajectory, order_arms
 from indicial.flightsim.initial import InitialState
 from indicial.flightsim.modes import Modes, missile_modes
-from indicial.flightsim.simulate import fly, suggest_method, suggest_step
+from indicial.flightsim.simulate import MAX_STEPS, fly, suggest_method, suggest_step
 from indicial.flightsim.trajectory import Trajectory
 from indicial.flightsim.vehicle import Vehicle
 
@@ -318,6 +318,9 @@ def check_damping(
     if step is None:
         step, kept = suggest_step(dynamics, dynamics.initial_vector(initial), np.zeros(0), duration)
         step, every, method = 0.5 * step, 2 * kept, suggest_method(kept)
+        if duration > MAX_STEPS * step:
+            told = f"a flight of {duration:.3g} s at a roll rate of {roll_rate:.4g} rad/s"
+            raise InputError(f"{told} takes {duration / step:.2g} steps, at most {MAX_STEPS} are flown")
     trajectory = fly(dynamics, initial, duration, step=step, every=every, method=method)
     transient = max((10.0 / abs(mode.per_metre.real) for mode in modes.lag), default=0.0)
     skip = min(transient, 0.25 * distance)

@@ -34,7 +34,7 @@ TOLERANCE = 1e-11
 
 _STIFF_BLOCK = 128  # instants CVODES marches between looks at the end: nothing need be well behaved beyond it
 _STIFF = 10  # steps an instant from which CVODES takes less time than Runge-Kutta
-_MAX_STEPS = 20_000_000
+MAX_STEPS = 20_000_000
 _MAX_ADAPTIVE_STEPS = 400_000
 _LEAST_TOLERANCE = 1e-14  # that double precision can tell
 
@@ -178,8 +178,8 @@ def fly(
         raise InputError(f"every is {every}, must be at least 1 (every step is kept)")
     if method != "rk4":
         step, every = every * step, 1  # instants only
-    if not (math.isfinite(step) and 0.0 < step <= duration) or duration / step > _MAX_STEPS:
-        raise InputError(f"step is {step} s, must be at most the duration and no less than 1/{_MAX_STEPS} of it")
+    if not (math.isfinite(step) and 0.0 < step <= duration) or duration / step > MAX_STEPS:
+        raise InputError(f"step is {step} s, must be at most the duration and no less than 1/{MAX_STEPS} of it")
     end = End() if end is None else end
     if end.margins(dynamics, start[None, :], values).min(initial=math.inf) < 0.0:
         raise InputError("the flight starts beyond its end")
