@@ -206,6 +206,12 @@ def finner_range(reduction: Reduction = "multifit") -> DerivativeTable:
     return DerivativeTable(tuple(records))
 
 
+def finner_range_machs() -> tuple[float, float]:
+    """Lowest and highest Mach number of the multiple fits, between which `finner_range_at` answers."""
+    machs = [record.mach for record in finner_range("multifit").records]
+    return min(machs), max(machs)
+
+
 def finner_range_at(mach: float) -> DerivativeTable:
     """The multiple-fit range data at one Mach number, linear between the two neighbouring groups.
 

@@ -1,6 +1,7 @@
 """The Basic Finner itself, on a mesh far too coarse to trust, through the real line: what must hold on any mesh."""
 
 import json
+import re
 
 import pytest
 
@@ -10,10 +11,10 @@ from indicial.pipeline import ALL_STAGES, RunFolder, run_stages
 from indicial.reference_data import find_case
 
 
-@pytest.fixture(scope="module")
-def results(tmp_path_factory) -> dict:
-    text = find_case("basic_finner_quick").read_text(encoding="utf-8")
-    case = parse_case(text.replace("resolution = 1.0", "resolution = 0.5"))
+@pytest.fixture(scope="module", params=["basic_finner_quick", "basic_finner_transonic"])
+def results(request, tmp_path_factory) -> dict:
+    text = find_case(request.param).read_text(encoding="utf-8")
+    case = parse_case(re.sub(r"resolution = [\d.]+", "resolution = 0.5", text))
     folder = RunFolder(tmp_path_factory.mktemp("finner"))
     run_stages(case, folder, ALL_STAGES, workers=1)
     return json.loads((folder.path / "results.json").read_text(encoding="utf-8"))

@@ -33,7 +33,19 @@ def test_case_gives_condition_and_reference_in_si_units_and_radians():
         ("mach = 2.0", 'mach = "2"', r"f\.toml: condition\.mach: is '2'; allowed: a number greater than 0 and at most"),
         ("mach = 2.0", "mach = nan", r"f\.toml: condition\.mach: is nan; allowed"),
         ("mach = 2.0", "mach = true", r"f\.toml: condition\.mach: is True; allowed: a number"),
-        ("mach = 2.0", "mach = 1.2", r"f\.toml: condition\.mach: is too low .* allowed: at least 1\.4"),
+        ("mach = 2.0", "mach = 1.2", r"f\.toml: condition\.mach: is too low .* allowed: at least 1\.4, or any"),
+        ("resolution = 1.0", 'resolution = 1.0\nwake = "base"', r"mesh\.wake: is 'base'; allowed: 'none' or 'sting'"),
+        (
+            "resolution = 1.0",
+            "resolution = 1.0\nradius_calibres = 40.0",
+            r"mesh\.radius_calibres: says nothing with wake = 'none'; allowed: leave it out",
+        ),
+        (
+            "resolution = 1.0",
+            'resolution = 1.0\nmargin = 1.2\nwake = "sting"',
+            r"mesh\.margin: says nothing with wake = 'sting'; allowed: leave it out",
+        ),
+        ("mach = 2.0", "mach = 5.0", r"comparison\.measured: was flown from Mach 1\.077 to 4\.3, not at 5; allowed"),
         ("mach = 2.0\n", "", r"f\.toml: condition\.mach: missing; allowed: a number"),
         ("mach = 2.0", "mach = = 2.0", r"f\.toml: not valid TOML: .*line "),
         ("diameter_m = 0.030", "diameter_mm = 30.0", r"shape\.diameter_mm: unknown key; did you mean 'diameter_m'"),
@@ -91,3 +103,12 @@ def test_reference_page_lists_every_key():
     page = case_reference()
     for key in ("mach", "trailing_edge_calibres", "steps_per_period", "transverse_inertia_kg_m2", "workers"):
         assert f"| `{key}` |" in page
+
+
+def test_subsonic_flow_asks_for_distance_ahead_of_the_nose():
+    subsonic = QUICK.replace("mach = 2.0", "mach = 0.8").replace("basic_finner_range", "none")
+    near = subsonic.replace("resolution = 1.0", 'resolution = 1.0\nwake = "sting"')
+    with pytest.raises(InputError, match=r"mesh\.upstream_calibres: is 2, too short .* at least 10 below Mach 1"):
+        parse_case(near)
+    far = near.replace('"sting"', '"sting"\nupstream_calibres = 20.0')
+    assert parse_case(far).mesh.upstream_calibres == 20.0

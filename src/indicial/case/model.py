@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from indicial.conventions import ReferenceQuantities
 from indicial.motion import FlightCondition
+from indicial.reference_data import finner_range_machs
 
 if TYPE_CHECKING:
     from indicial.cfd.shapes import FinnedBody
@@ -36,6 +37,7 @@ UNITS = {
 """Unit of a quantity by its key or the end of it."""
 
 Positive = Annotated[float, Field(gt=0.0)]
+Distance = Annotated[float, Field(ge=1.0, le=200.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 SmallAngle = Annotated[float, Field(gt=0.0, le=5.0)]
 SmallRate = Annotated[float, Field(gt=0.0, le=0.05)]
@@ -115,6 +117,27 @@ class Mesh(Section):
     margin: Annotated[
         float, Field(ge=1.0, le=3.0, description="distance of the outer boundary, relative to the bow shock's")
     ] = 1.15
+    wake: Annotated[
+        Literal["none", "sting"],
+        Field(
+            description="behind the base: nothing, for supersonic flow from Mach 1.4, or the body goes on as a "
+            "cylinder without load in a wide domain, for any Mach number and 2.4 times the cells"
+        ),
+    ] = "none"
+    upstream_calibres: Annotated[
+        Distance,
+        Field(description="nose to the upstream end, with a sting: short above Mach 1, at least 10 below"),
+    ] = 2.0
+    downstream_calibres: Annotated[Distance, Field(description="base to the downstream end, with a sting")] = 20.0
+    radius_calibres: Annotated[Distance, Field(description="radius of the domain, with a sting")] = 30.0
+
+    @model_validator(mode="after")
+    def _used(self) -> Self:
+        outer = {"sting": ["margin"], "none": ["upstream_calibres", "downstream_calibres", "radius_calibres"]}
+        for key in outer[self.wake]:
+            if key in self.model_fields_set:
+                raise ValueError(f"{key}: says nothing with wake = {self.wake!r}; allowed: leave it out")
+        return self
 
 
 class Flow(Section):
@@ -298,11 +321,24 @@ class Case(Section):
 
     @model_validator(mode="after")
     def _solvable(self) -> Self:
-        if self.condition.mach < 1.4:
+        mach = self.condition.mach
+        if mach < 1.4 and self.mesh.wake == "none":
             raise ValueError(
                 "condition.mach: is too low for a mesh that ends at the base, where all flow must leave supersonic; "
-                "allowed: at least 1.4"
+                "allowed: at least 1.4, or any with wake = 'sting' in the table mesh"
             )
+        if mach < 1.0 and self.mesh.upstream_calibres < 10.0:
+            raise ValueError(
+                f"mesh.upstream_calibres: is {self.mesh.upstream_calibres:g}, too short for subsonic flow; "
+                "allowed: at least 10 below Mach 1"
+            )
+        if self.comparison.measured == "basic_finner_range":
+            lowest, highest = finner_range_machs()
+            if not lowest <= mach <= highest:
+                raise ValueError(
+                    f"comparison.measured: was flown from Mach {lowest:g} to {highest:g}, not at {mach:g}; "
+                    "allowed: 'none' there"
+                )
         if not 0.0 < self.reference.moment_reference_calibres < self.shape.length_calibres:
             raise ValueError("reference.moment_reference_calibres: is off the body; allowed: 0 to length_calibres")
         return self

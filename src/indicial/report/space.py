@@ -104,7 +104,7 @@ def _quads(polygons: Polygons) -> Array:
 
 
 def mesh_figure(mesh: Mesh, diameter: float) -> Figure:
-    """The mesh in the symmetry plane, near the nose, round the fins, and on the body.
+    """The mesh in the symmetry plane, round the fins (with a sting, the whole domain instead), and on the body.
 
     Parameters
     ----------
@@ -114,10 +114,10 @@ def mesh_figure(mesh: Mesh, diameter: float) -> Figure:
         Unit of the axes [m].
     """
     plane = _quads(patch_polygons(mesh, mesh.patch("symmetry").faces)) / diameter
-    base = _quads(patch_polygons(mesh, mesh.patch("outflow").faces)) / diameter
     walls = np.concatenate(
         [_quads(patch_polygons(mesh, patch.faces)) for patch in mesh.patches if patch.kind == "wall"]
     )
+    wide = all(patch.kind != "outflow" for patch in mesh.patches)
     with figure_style() as plt:
         figure: Figure = plt.figure(figsize=(11.0, 7.4))
         parts: Any = figure.subfigures(2, 1, height_ratios=(1.15, 1.0))
@@ -127,12 +127,25 @@ def mesh_figure(mesh: Mesh, diameter: float) -> Figure:
         axes.set(xlabel="x/d, aft of the nose", ylabel="z/d", title="symmetry plane", aspect="equal")
         axes.autoscale_view()
         left, right = bottom.subplots(1, 2, width_ratios=(1.0, 1.5))
-        _draw(left, base[..., [1, 2]], edge="0.25")
-        left.set(xlabel="y/d", ylabel="z/d", title="plane of the base: the fins' gaps", aspect="equal")
-        left.set(xlim=(-0.05, 2.2), ylim=(-2.0, 2.0))
+        if wide:
+            axes.set(**_near(walls / diameter, plane))
+            _draw(left, plane[..., [0, 2]], edge="0.25")
+            left.set(xlabel="x/d", ylabel="z/d", title="the whole domain", aspect="equal")
+        else:
+            base = _quads(patch_polygons(mesh, mesh.patch("outflow").faces)) / diameter
+            _draw(left, base[..., [1, 2]], edge="0.25")
+            left.set(xlabel="y/d", ylabel="z/d", title="plane of the base: the fins' gaps", aspect="equal")
+            left.set(xlim=(-0.05, 2.2), ylim=(-2.0, 2.0))
         _surface(right, walls / diameter, None, edge="0.3")
         right.set_title("surface")
         return figure
+
+
+def _near(walls: Array, plane: Array) -> dict[str, tuple[float, float]]:
+    """Limits of x and z that show the body and, as far as there is a mesh, a part of its length all round."""
+    length = float(walls[..., 0].max())
+    first, last = float(plane[..., 0].min()), float(plane[..., 0].max())
+    return {"xlim": (max(first, -0.15 * length), min(last, 1.3 * length)), "ylim": (-0.4 * length, 0.4 * length)}
 
 
 def flow_figure(picture: FlowPicture, diameter: float) -> Figure:
@@ -143,8 +156,7 @@ def flow_figure(picture: FlowPicture, diameter: float) -> Figure:
         plane = _draw(above, picture.plane_corners[..., [0, 2]] / diameter, picture.plane_mach, cmap="viridis")
         figure.colorbar(plane, ax=above, label="Mach number relative to the body", shrink=0.9)
         above.set(xlabel="x/d, aft of the nose", ylabel="z/d", aspect="equal")
-        height = 0.4 * float(picture.plane_corners[..., 0].max()) / diameter
-        above.set(ylim=(-height, height))
+        above.set(**_near(picture.wall_corners / diameter, picture.plane_corners / diameter))
         above.set_title(f"{picture.title}: symmetry plane")
         limit = float(np.quantile(np.abs(picture.wall_cp), 0.98))
         wall = _surface(below, picture.wall_corners / diameter, picture.wall_cp, cmap="RdBu_r", limit=limit)
