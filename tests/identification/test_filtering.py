@@ -94,7 +94,7 @@ def peer(model, record):
         if k:
             step = record.time[k] - record.time[k - 1]
             _, kf.F, slope = model.advance(kf.x, np.zeros(1), np.zeros(1), step, record.time[k - 1])
-            kf.Q = noise_covariance(np.ascontiguousarray(slope), model.intensity, step)
+            kf.Q = noise_covariance(np.ascontiguousarray(slope), model.intensity, step, model.substeps)
             kf.predict()
             transitions.append(kf.F)
             noises.append(kf.Q)
@@ -131,6 +131,30 @@ def test_the_interval_is_that_of_the_matrix_exponential():
     assert max(apart[0]) < 1e-6
     for coarse, fine in zip(*apart, strict=True):
         assert coarse / fine == pytest.approx(32.0, rel=0.1)
+
+
+@pytest.mark.parametrize("method", ["extended", "unscented"])
+def test_a_process_that_dies_out_between_instants_keeps_its_variance(method):
+    """dx/dt = -x/T + w, seen every 4 T: without a word of its past, its variance is w^2 T/2 ever again."""
+    intensity, constant = 0.7, 0.1
+    (x,) = (ca.SX.sym("x"),)
+    model = state_model({"x": -x / constant}, {"alpha": x}, [x], intensity={"x": intensity}, substeps=40)
+    time = 4.0 * constant * np.arange(12)
+    seen = FlightRecord(time, {"alpha": 0.01 * np.arange(12.0)}, {}, {"alpha": 0.05})
+    found = filter_record(model, seen, {"x": 0.0}, {"x": intensity * np.sqrt(constant / 2.0)}, method=method)
+    stationary = intensity**2 * constant / 2.0
+    before = found.filtered_covariance[:-1, 0, 0]
+    exact = stationary + (before - stationary) * np.exp(-8.0)
+    np.testing.assert_allclose(found.made.predicted_covariance[1:, 0, 0], exact, rtol=1e-5)
+
+
+def test_noise_in_pieces_is_that_of_the_matrix_exponential():
+    slope, interval = 30.0 * A, 0.1
+    block = expm(np.block([[-slope, np.diag(INTENSITY**2)], [np.zeros((2, 2)), slope.T]]) * interval)
+    exact = block[2:, 2:].T @ block[:2, 2:]
+    apart = [np.max(np.abs(noise_covariance(slope, INTENSITY, interval, n) - exact)) for n in (64, 128)]
+    assert apart[0] < 1e-5 * np.max(exact)
+    assert apart[0] / apart[1] == pytest.approx(16.0, rel=0.1)
 
 
 def test_noise_of_one_state_leaves_no_negative_variance_in_those_that_it_reaches_late():

@@ -248,10 +248,11 @@ class FilterInput:
         made = Filtered.empty(self.time.size, self.mean.size, self.variance.size)
         turning = np.array([name in ANGLES for name in self.model.channels])
         given = (self.time, self.parameters, self.measured, turning, self.variance)
-        gaussian = (self.intensity, self.mean, np.diag(self.errors**2))
+        gaussian = (self.mean, np.diag(self.errors**2))
         if method == "extended":
-            return extended_filter(self.model.step.code, self.model.view.code, *given, *gaussian, made), made
-        return unscented_filter(self.model, *given, *gaussian, made), made
+            codes, noise = (self.model.step.code, self.model.view.code), (self.intensity, self.model.substeps)
+            return extended_filter(*codes, *given, *noise, *gaussian, made), made
+        return unscented_filter(self.model, *given, self.intensity, *gaussian, made), made
 
 
 def filter_record(

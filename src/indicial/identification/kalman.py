@@ -63,20 +63,33 @@ class Filtered(NamedTuple):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def noise_covariance(slope: Array, intensity: Array, interval: float) -> Array:
+def noise_covariance(slope: Array, intensity: Array, interval: float, pieces: int = 1) -> Array:
     """``int exp(A s) W exp(A^T s) ds`` over an interval [s], by Gauss's rule with two nodes, shape (nx, nx).
 
     Its error is of fifth order in the interval, and it is never negative in any direction, as a series cut off can be.
+    In equal pieces, one after the other, it is as good as their length: a process that dies out within the interval
+    needs them as the state's own steps do.
     """
     total = np.zeros_like(slope)
+    piece = interval / pieces
     for side in (-1.0, 1.0):
-        length = 0.5 * interval * (1.0 + side / np.sqrt(3.0))
-        term = np.diag(intensity)
-        root = term.copy()
-        for k in range(1, 5):
-            term = slope @ term * (length / k)
-            root += term
-        total += 0.5 * interval * (root @ root.T)
+        root = _exponential(slope, np.diag(intensity), 0.5 * piece * (1.0 + side / np.sqrt(3.0)))
+        total += 0.5 * piece * (root @ root.T)
+    if pieces > 1:
+        first, across = total.copy(), _exponential(slope, np.eye(len(slope)), piece)
+        for _ in range(pieces - 1):
+            total = first + across @ total @ across.T
+    return total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _exponential(slope: Array, matrix: Array, length: float) -> Array:
+    """``exp(A length)`` times a matrix, to fourth order."""
+    term = matrix
+    total = matrix.copy()
+    for k in range(1, 5):
+        term = slope @ term * (length / k)
+        total += term
     return total
 
 
@@ -90,6 +103,7 @@ def extended_filter(
     turning: NDArray[np.bool_],
     variance: Array,
     intensity: Array,
+    substeps: int,
     mean: Array,
     spread: Array,
     made: Filtered,
@@ -112,6 +126,8 @@ def extended_filter(
         Of the noise of channels, shape (nc,).
     intensity : ndarray
         Square roots of W, which is diagonal, shape (nx,).
+    substeps : int
+        Of the model's.
     mean, spread : ndarray
         Of the state before the first measurement, shapes (nx,) and (nx, nx).
     """
@@ -129,7 +145,7 @@ def extended_filter(
             slope = stepped[nx + nx * nx :].reshape((nx, nx))
             across = p @ transition.T
             made.cross_covariance[k] = across
-            p = transition @ across + noise_covariance(slope, intensity, interval)
+            p = transition @ across + noise_covariance(slope, intensity, interval, substeps)
         made.predicted[k], made.predicted_covariance[k] = x, p
         evaluate_code(view, x, parameters[k], time[k], seen)
         for i in range(nc):

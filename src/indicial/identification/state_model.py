@@ -4,7 +4,8 @@ r"""A model of motion with noise, discretised and compiled, as filters and input
 
 From one instant to the next, classical Runge-Kutta steps with controls linear between the instants; the transition
 matrix F is the exact Jacobian of those steps. The covariance that the noise leaves in the state obeys
-``dQ/dt = A Q + Q A^T + W``, taken over the interval to fourth order with A at its middle (`kalman.noise_covariance`).
+``dQ/dt = A Q + Q A^T + W``, taken over the same steps to fourth order with A at the interval's middle
+(`kalman.noise_covariance`).
 
 Unknown constants, random walks and first-order Gauss-Markov processes (``db/dt = -b/tau + w``: gusts, drifting biases)
 are states like any other: a state's name says which symbol of the model it stands for.
@@ -74,6 +75,8 @@ class StateModel:
         (state, parameters at both ends and the interval [s], time at its start) -> state after it, F and A.
     view : Kernel
         (state, parameters, time) -> outputs and their Jacobian H.
+    substeps : int
+        Runge-Kutta steps between two instants, over which the noise is taken too.
     """
 
     state_names: tuple[str, ...]
@@ -83,6 +86,7 @@ class StateModel:
     intensity: Array
     step: Kernel
     view: Kernel
+    substeps: int = 1
 
     def advance(self, state: Array, before: Array, after: Array, interval: float, time: float) -> tuple[Array, ...]:
         """State after an interval [s], shape (nx,), its Jacobian F and A at the middle, shape (nx, nx)."""
@@ -121,7 +125,8 @@ def state_model(
     processes : mapping of str to Process
         Symbols that are estimated with the states.
     substeps : int
-        Runge-Kutta steps between two instants.
+        Runge-Kutta steps between two instants, for the noise too: each should be a fraction of the shortest time
+        constant.
 
     Raises
     ------
@@ -159,6 +164,7 @@ def state_model(
         view=compile_function(
             ca.Function("view", [state, given, TIME], [ca.vertcat(seen, _rows(ca.jacobian(seen, state)))])
         ),
+        substeps=substeps,
     )
 
 

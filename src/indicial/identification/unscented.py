@@ -75,7 +75,7 @@ def _predict(
         moved.append(_finite(model.advance(x, *span)[0]))
         return moved[-1]
 
-    ukf.Q = noise_covariance(np.ascontiguousarray(slope), intensity, span[2])
+    ukf.Q = noise_covariance(np.ascontiguousarray(slope), intensity, span[2], model.substeps)
     ukf.predict(dt=span[2], fx=move)
     cross: Array = (ukf.Wc[:, None] * old).T @ (np.array(moved) - ukf.x)
     return cross
