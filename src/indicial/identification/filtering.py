@@ -250,8 +250,8 @@ class FilterInput:
         given = (self.time, self.parameters, self.measured, turning, self.variance)
         gaussian = (self.mean, np.diag(self.errors**2))
         if method == "extended":
-            codes, noise = (self.model.step.code, self.model.view.code), (self.intensity, self.model.substeps)
-            return extended_filter(*codes, *given, *noise, *gaussian, made), made
+            step, view = self.model.step.code, self.model.view.code
+            return extended_filter(step, view, *given, self.intensity, self.model.substeps, *gaussian, made), made
         return unscented_filter(self.model, *given, self.intensity, *gaussian, made), made
 
 
