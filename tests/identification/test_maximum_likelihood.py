@@ -26,7 +26,8 @@ START = InitialState.from_path(60.0, alpha=0.05)
 
 
 @cache
-def aircraft():
+def aircraft(twice=False):
+    """With a derivative of the elevator that stands there twice, if asked."""
     reference = ReferenceQuantities(length=1.5, area=16.0, lateral_length=11.0, moment_reference=(0.0, 0.0, 0.0))
     vehicle = Vehicle(
         name="light aircraft",
@@ -43,7 +44,7 @@ def aircraft():
         CZ_alpha=free["CZ_alpha"],
         Cm_alpha=free["Cm_alpha"],
         Cm_q=free["Cm_q"],
-        Cm_0=0.04 + free["Cm_elevator"] * ca.SX.sym("elevator"),
+        Cm_0=0.04 + (free["Cm_elevator"] + (ca.SX.sym("Cm_tab") if twice else 0.0)) * ca.SX.sym("elevator"),
     )
     return build_dynamics(vehicle, model)
 
@@ -128,6 +129,24 @@ def test_what_the_engine_finds_is_what_scipy_finds():
     errors = np.sqrt(np.diag(found.covariance))
     np.testing.assert_allclose((values - best.x) / errors, 0.0, atol=2e-3)
     np.testing.assert_allclose(errors, np.sqrt(np.diag(np.linalg.inv(best.jac.T @ best.jac))), rtol=1e-3)
+
+
+def test_parameters_of_one_effect_are_fitted_as_their_sum_and_named():
+    """Exactly the same sensitivities: the fit is that of the sum, whose error is told beside the two that are lost."""
+    record = simulated(seed=4)
+    alone = fit_manoeuvres([manoeuvre(record)], parameters(1.1), threads=1)
+    both = Manoeuvre.of_flight(record, aircraft(twice=True), START, free_start=("alpha", "theta", "q"))
+    found = fit_manoeuvres([both], [*parameters(1.1), Parameter("Cm_tab", 0.3)], threads=1)
+    total, error = found["Cm_elevator"].value + found["Cm_tab"].value, alone["Cm_elevator"].standard_error
+    assert total == pytest.approx(alone["Cm_elevator"].value, abs=1e-2 * error)
+    for name in ("CZ_alpha", "Cm_alpha", "Cm_q"):
+        assert found[name].value == pytest.approx(alone[name].value, abs=1e-2 * alone[name].standard_error)
+        assert found[name].standard_error == pytest.approx(alone[name].standard_error, rel=1e-2)
+    (finding,) = found.findings
+    assert "cannot separate" in finding and "Cm_elevator" in finding and "Cm_tab" in finding
+    told = float(finding.split("sum, +- ")[1].split(":")[0])
+    assert told == pytest.approx(error, rel=0.1)
+    assert min(found["Cm_tab"].standard_error, found["Cm_elevator"].standard_error) > 1e4 * error
 
 
 @pytest.mark.parametrize("factor", [1.0 / 3.0, 3.0])

@@ -27,6 +27,7 @@ _COLLINEAR = 30.0  # condition index from which Belsley, Kuh & Welsch speak of m
 _SHARE = 0.5  # of the variance of an estimate: what they ask for to name it
 _LINKED = 0.1  # of the projector onto what is not told: smaller entries are no link
 _TOLD = 0.1  # of the error alone: so well known a combination is worth naming
+_LEAST_TOLD = 1e-7
 _WEAK = 0.5  # relative standard error from which a value is called undetermined
 
 
@@ -49,10 +50,14 @@ class Whiteness:
 
 
 def cramer_rao(whitened: Array) -> Array:
-    """``(S^T R^-1 S)^-1`` from whitened sensitivities (n_data, n), by singular values, shape (n, n)."""
+    """``(S^T R^-1 S)^-1`` from whitened sensitivities (n_data, n), by singular values, shape (n, n).
+
+    A direction that is told less than 1e-7 times as well as the best (columns scaled) counts as told so well: the matrix
+    would hold nothing of the others in double precision.
+    """
     size = np.linalg.norm(whitened, axis=0)
     _, singular, rows = np.linalg.svd(whitened / size, full_matrices=False)
-    half = rows.T / np.maximum(singular, np.finfo(float).eps * singular[0]) / size[:, None]
+    half = rows.T / np.maximum(singular, _LEAST_TOLD * singular[0]) / size[:, None]
     covariance: Array = half @ half.T
     return covariance
 

@@ -301,14 +301,18 @@ def minimise(problem: Problem, point: _Point, noise: Noise, cost: list[float]) -
 
 
 def gauss_newton_step(slopes: Array, residuals: Array, damping: float) -> tuple[Array, float]:
-    """Damped Gauss-Newton step, and the length of the undamped one in standard errors."""
+    """Damped Gauss-Newton step, and the length of the undamped one in standard errors.
+
+    Directions that the rows do not tell beyond round-off have no part in either.
+    """
     size = np.linalg.norm(slopes, axis=0)
     triangle = np.asarray(np.linalg.qr(np.column_stack([slopes / size, residuals]), mode="r"))
     left, singular, rows = np.linalg.svd(triangle[: size.size, : size.size])
     along = left.T @ triangle[: size.size, -1]
-    smallest = np.finfo(float).eps * slopes.shape[0] * singular[0]  # below it directions are round-off
-    gain = np.where(singular > smallest, singular / (singular**2 + damping + smallest**2), 0.0)
-    return rows.T @ (gain * along) / size, float(np.linalg.norm(along))
+    smallest = np.finfo(float).eps * slopes.shape[0] * singular[0]
+    told = singular > smallest
+    gain = np.where(told, singular / (singular**2 + damping + smallest**2), 0.0)
+    return rows.T @ (gain * along) / size, float(np.linalg.norm(along[told]))
 
 
 def estimated_noise(problem: Problem, point: _Point, noise: Noise, colour: bool) -> Noise:
