@@ -3,7 +3,7 @@
 Output error of 200 simulated records of one 3-2-1-1 (500 samples, 4 derivatives, unknown start): parameter by
 parameter, the share of intervals that hold the truth, and the reported standard error over the true scatter, with
 white noise and with noise of first order, 0.9 from sample to sample. aeroid's standard errors beside it, on 40 of the
-coloured records, where it is installed.
+coloured records, its start known, where it is installed.
 """
 
 from __future__ import annotations

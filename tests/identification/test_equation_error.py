@@ -12,6 +12,7 @@ from indicial.flightsim import Vehicle
 from indicial.identification import FlightRecord, aerodynamic_coefficient, diagnose, differentiate, equation_error
 from indicial.identification.coefficients import polynomial_terms, regressor
 from indicial.identification.instruments import gauss_markov
+from indicial.identification.least_squares import coloured_covariance, solve
 
 REFERENCE = ReferenceQuantities(2.0, 16.0, moment_reference=(3.1, 0.1, 0.2), lateral_length=8.0)
 INERTIA = np.array([[1000.0, 20.0, -150.0], [20.0, 3000.0, 30.0], [-150.0, 30.0, 3500.0]])
@@ -142,6 +143,20 @@ def test_reported_errors_are_the_scatter(noise, band):
     rms, reported, held = scatter(record, noise, "CZ", ("alpha", "elevator"), LIFT, band=band)
     np.testing.assert_allclose(reported, rms, rtol=0.15)
     assert np.all((held >= 0.90) & (held <= 0.98))
+
+
+def test_errors_of_a_short_record_with_white_noise_are_those_of_white_noise():
+    """A fit takes power from the residuals where its regressors have theirs; no colour is read into that."""
+    t = 0.02 * np.arange(250)
+    columns = np.column_stack([np.ones(250), np.sin(2.5 * t), np.cos(2.5 * t) + 0.4 * np.sin(6.9 * t), np.sin(1.7 * t)])
+    scaled = []
+    for seed in range(400):
+        noise = np.random.default_rng(seed).standard_normal(250)
+        values, inverse = solve(columns, noise)
+        covariance, _ = coloured_covariance(columns, noise - columns @ values, inverse)
+        scaled.append(values / np.sqrt(np.diag(covariance)))
+    size = np.sqrt(np.mean(np.square(scaled), axis=0))
+    assert np.all(np.abs(size - 1.0) < 0.12), size  # known within 3.5%
 
 
 def test_white_errors_would_be_too_small_for_coloured_residuals():

@@ -143,7 +143,7 @@ def test_parameters_of_one_effect_are_fitted_as_their_sum_and_named():
         assert found[name].value == pytest.approx(alone[name].value, abs=1e-2 * alone[name].standard_error)
         assert found[name].standard_error == pytest.approx(alone[name].standard_error, rel=1e-2)
     (finding,) = found.findings
-    assert "cannot separate" in finding and "Cm_elevator" in finding and "Cm_tab" in finding
+    assert all(part in finding for part in ("cannot separate", "Cm_elevator", "Cm_tab"))
     told = float(finding.split("sum, +- ")[1].split(":")[0])
     assert told == pytest.approx(error, rel=0.1)
     assert min(found["Cm_tab"].standard_error, found["Cm_elevator"].standard_error) > 1e4 * error

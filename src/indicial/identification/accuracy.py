@@ -52,8 +52,8 @@ class Whiteness:
 def cramer_rao(whitened: Array) -> Array:
     """``(S^T R^-1 S)^-1`` from whitened sensitivities (n_data, n), by singular values, shape (n, n).
 
-    A direction that is told less than 1e-7 times as well as the best (columns scaled) counts as told so well: the matrix
-    would hold nothing of the others in double precision.
+    A direction that is told less than 1e-7 times as well as the best (columns scaled) counts as told so well: in double
+    precision the matrix would hold nothing of the others.
     """
     size = np.linalg.norm(whitened, axis=0)
     _, singular, rows = np.linalg.svd(whitened / size, full_matrices=False)

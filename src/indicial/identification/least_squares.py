@@ -3,7 +3,7 @@ r"""Linear least squares with covariances that hold for coloured residuals.
 Of ``z = X theta + v``, v of covariance ``s^2 P``, the estimate ``D X^T z`` with ``D = (X^T X)^-1`` has the covariance
 ``s^2 D X^T P X D`` (Klein & Morelli, "Aircraft System Identification" (2006), sec. 5.2). In time P is Toeplitz; they
 sample its autocorrelations, which leaves errors too small in short records. Here an autoregressive model of the
-residuals gives them, by Burg's method, of the order up to 30 that Akaike's criterion likes best (Kay, "Modern Spectral
+residuals gives them, by Burg's method, of the order up to 30 that Schwarz's criterion likes best (Kay, "Modern Spectral
 Estimation" (1988), ch. 7), and s^2 is free of bias for this P:
 
     s^2 = v^T v/(N - trace(D X^T P X)).
@@ -92,7 +92,7 @@ def autocorrelation(residuals: Array) -> Array:
         longer = np.append(predictor, 0.0)
         predictor = longer - k * longer[::-1]
         log_variance += math.log(max(1.0 - k * k, 1e-12))
-        criterion = n * log_variance + 2.0 * order
+        criterion = n * log_variance + math.log(n) * order
         if criterion < best:
             best, chosen = criterion, predictor
     spectrum = 1.0 / np.abs(np.fft.rfft(chosen, 16 * n)) ** 2
