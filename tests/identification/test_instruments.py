@@ -6,7 +6,7 @@ import pytest
 from flightsim.support import FINNER
 from identification.support import flight
 from indicial.errors import InputError
-from indicial.flightsim import Signal, Trajectory
+from indicial.flightsim import WGS84, Signal, Trajectory
 from indicial.flightsim.turbulence import DrydenTurbulence
 from indicial.identification import Installation, Sensor, measure_flight
 
@@ -43,6 +43,17 @@ def test_without_errors_instruments_show_the_flight():
     assert set(expected) == set(names)
     for name, values in expected.items():
         np.testing.assert_allclose(record[name], values, rtol=1e-7, atol=1e-7, err_msg=name)
+
+
+def test_over_a_round_earth_altitude_is_above_the_ellipsoid():
+    """Straight on for 100 km, the ground falls away by some 780 m."""
+    earth = WGS84(latitude=0.7, azimuth=1.0)
+    sensors = dict.fromkeys(("x", "y", "z", "altitude"), Sensor(1.0))
+    record = measure_flight(steady(1000.0), FINNER, sensors, seed=None, earth=earth)
+    ends = np.stack([record[name] for name in "xyz"], axis=1)[[0, -1]]
+    altitude = record["altitude"][[0, -1]]
+    np.testing.assert_allclose(altitude, earth.geodetic(ends)[2], atol=1e-6)
+    assert altitude[1] - altitude[0] == pytest.approx(1e5**2 / (2.0 * 6.371e6), rel=0.01)
 
 
 def test_angular_accelerations_are_the_slopes_of_the_rates():

@@ -18,12 +18,13 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 
+import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
 from indicial.conventions import Array, flow_angles
 from indicial.errors import InputError
-from indicial.flightsim import Signal, Trajectory, Vehicle
+from indicial.flightsim import Earth, FlatEarth, Signal, Trajectory, Vehicle
 from indicial.flightsim.attitude import matrix_from_quaternion
 from indicial.flightsim.expressions import is_number
 from indicial.flightsim.turbulence import DrydenTurbulence
@@ -125,6 +126,7 @@ def measure_flight(
     installation: Installation | None = None,
     turbulence: DrydenTurbulence | None = None,
     thrust: ArrayLike = 0.0,
+    earth: Earth | None = None,
 ) -> FlightRecord:
     """What instruments give of a simulated flight.
 
@@ -149,6 +151,8 @@ def measure_flight(
         Seen by the air data only, besides the wind of the flight: the vehicle does not answer to it.
     thrust : array_like
         Force along the body's x axis through the centre of gravity, besides the aerodynamic one [N], scalar or (n,).
+    earth : Earth, optional
+        On which it was flown, for altitude; flat if not given.
 
     Raises
     ------
@@ -166,7 +170,7 @@ def measure_flight(
         raise InputError(f"the flight is too short for {highest:g} Hz")
     time = np.minimum(trajectory.time[0] + np.arange(number) / highest, trajectory.time[-1])
     place = Installation() if installation is None else installation
-    exact = exact_channels(trajectory, vehicle, place, turbulence, thrust)
+    exact = exact_channels(trajectory, vehicle, place, turbulence, thrust, earth)
     channels: dict[str, Array] = {}
     for name, sensor in sensors.items():
         check_channel(name)
@@ -193,6 +197,7 @@ def exact_channels(
     installation: Installation,
     turbulence: DrydenTurbulence | None = None,
     thrust: ArrayLike = 0.0,
+    earth: Earth | None = None,
 ) -> dict[str, Array]:
     """True values of every channel at the instants of a trajectory; arguments as `measure_flight`."""
     if not (is_number(vehicle.mass) and isinstance(vehicle.inertia, np.ndarray)):
@@ -209,13 +214,22 @@ def exact_channels(
         air = air - _gusts(trajectory, turbulence)
     speed, alpha, beta = flow_angles(air)
     yaw, pitch, roll = np.unwrap(trajectory.euler, axis=0).T
-    channels = dict(zip("xyz", trajectory.position.T, strict=True)) | {"altitude": -trajectory.position[:, 2]}
+    channels = dict(zip("xyz", trajectory.position.T, strict=True))
+    channels["altitude"] = _altitude(trajectory.position, FlatEarth() if earth is None else earth)
     channels |= {"V": speed, "alpha": installation.upwash * alpha, "beta": installation.sidewash * beta}
     channels |= {"mach": speed / trajectory.speed_of_sound, "dynamic_pressure": 0.5 * trajectory.density * speed**2}
     channels |= dict(zip(("p", "q", "r"), omega.T, strict=True))
     channels |= dict(zip(("pdot", "qdot", "rdot"), turning.T, strict=True))
     channels |= dict(zip(("ax", "ay", "az"), felt.T, strict=True))
     return channels | {"phi": roll, "theta": pitch, "psi": yaw}
+
+
+def _altitude(position: Array, earth: Earth) -> Array:
+    """Geometric altitude [m] of positions (n, 3), shape (n,)."""
+    place = ca.SX.sym("place", 3)
+    altitude = ca.Function("altitude", [place], [earth.altitude(place)])
+    found: Array = np.array(altitude(position.T)).ravel()
+    return found
 
 
 def gauss_markov(number: int, step: float, random: np.random.Generator) -> Array:
