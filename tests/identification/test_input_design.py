@@ -72,6 +72,19 @@ def test_what_a_manoeuvre_promises_is_the_covariance_that_its_record_gives():
     assert promise.outputs["alpha"].shape == TIME.shape
 
 
+def test_instants_far_apart_promise_what_their_few_samples_give():
+    """Every 0.5 s, two radians of the fastest motion: as a record of every 0.05 s of which the rest is missing."""
+    signal = Signal(TIME, 0.03 * np.sin(2.5 * TIME))
+    few = replace(experiment(), time=TIME[::10]).judge({"elevator": signal})
+    fine = flown(signal, None)
+    measured = np.full(fine.measured.shape, np.nan)
+    measured[::10] = fine.measured[::10]
+    record = replace(fine, measured=measured, substeps=np.full(TIME.size - 1, 4, dtype=np.int64))
+    fit = fit_manoeuvres([record], [Parameter(n, v) for n, v in TRUTH.items()], estimate_noise=False)
+    reported = [fit[name].standard_error for name in few.names]
+    np.testing.assert_allclose(few.standard_errors, reported, rtol=1e-2)
+
+
 def flown(signal, seed):
     """The record of a flight with this elevator."""
     promise = experiment().judge({"elevator": signal})

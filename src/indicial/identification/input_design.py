@@ -23,7 +23,7 @@ from indicial.errors import InputError
 from indicial.flightsim import Dynamics, InitialState, Signal
 from indicial.identification.accuracy import cramer_rao, undetermined
 from indicial.identification.maximum_likelihood import Noise, Problem
-from indicial.identification.problem import Manoeuvre, Parameter
+from indicial.identification.problem import Manoeuvre, Parameter, substeps_needed
 from indicial.identification.record import FlightRecord
 from indicial.identification.sensitivity import SensitivityModel
 
@@ -316,8 +316,21 @@ class _Judge:
         time = np.asarray(experiment.time, dtype=float)
         blank = FlightRecord(time, {c: np.zeros(time.size) for c in experiment.noise}, {}, dict(experiment.noise))
         self.manoeuvre = Manoeuvre.of_flight(
-            blank, experiment.dynamics, experiment.initial, free_start=experiment.free_start, model=self.model
+            blank,
+            experiment.dynamics,
+            experiment.initial,
+            free_start=experiment.free_start,
+            steps_per_interval=substeps_needed(time, self._fastest()),
+            model=self.model,
         )
+
+    def _fastest(self) -> float:
+        """Largest eigenvalue of the motion at the start, controls 0 [rad/s]: how short steps must be."""
+        dynamics = self.experiment.dynamics
+        believed = {**self.experiment.known, **self.experiment.values}
+        parameters = [believed.get(name, 0.0) for name in dynamics.parameter_names]
+        slope = dynamics.jacobian(dynamics.initial_vector(self.experiment.initial, parameters), parameters)
+        return float(np.max(np.abs(np.linalg.eigvals(slope))))
 
     def promise(self, inputs: Mapping[str, Signal | float]) -> Promise:
         experiment = self.experiment
