@@ -149,6 +149,30 @@ def test_parameters_of_one_effect_are_fitted_as_their_sum_and_named():
     assert min(found["Cm_tab"].standard_error, found["Cm_elevator"].standard_error) > 1e4 * error
 
 
+def test_steps_too_long_for_the_motion_are_told_with_those_that_are_not():
+    """Of a record every 0.25 s of an exact flight: one step an interval misses the truth, the number told finds it."""
+    fine = simulated(samples=801, duration=20.0)
+    channels = {c: fine[c][::10] for c in CHANNELS}
+    record = FlightRecord(fine.time[::10], channels, {"elevator": fine["elevator"][::10]}, NOISE)
+    known = {"elevator": Signal(fine.time, fine["elevator"])}
+
+    def fitted(steps):
+        coarse = replace(record, inputs={})
+        m = Manoeuvre.of_flight(coarse, aircraft(), START, known=known, model=compiled(), steps_per_interval=steps)
+        return fit_manoeuvres([m], parameters(1.05), estimate_noise=False, threads=1)
+
+    def off(found):
+        return max(abs(found[n].value - v) / found[n].standard_error for n, v in TRUTH.items())
+
+    long = fitted(1)
+    (finding,) = long.findings
+    enough = int(finding.rsplit(" ", 1)[1])
+    short = fitted(2 * enough)
+    assert "steps of record are long" in finding
+    assert not short.findings
+    assert off(short) < 0.2 < 0.5 < off(long)  # what is left is the jumps of the control, on which no step ends
+
+
 @pytest.mark.parametrize("factor", [1.0 / 3.0, 3.0])
 @pytest.mark.parametrize("segments", [1, 10])
 def test_a_start_a_factor_three_off_finds_the_truth_of_records_without_noise(factor, segments):

@@ -81,7 +81,7 @@ class OutputErrorFit:
     covariance : ndarray
         Of all, parameters first: the inverse information under the noise found, shape (n, n).
     findings : tuple of str
-        What the records cannot tell.
+        What the records cannot tell, and which were flown in too long steps.
     noise : dict
         Of each channel: estimated over stated standard deviation.
     memory : dict
