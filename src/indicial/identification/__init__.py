@@ -29,6 +29,7 @@ from indicial.identification.record import CHANNEL_UNITS, FlightRecord
 from indicial.identification.sensitivity import SensitivityModel
 from indicial.identification.state_model import Process, StateModel, state_model
 from indicial.identification.structure import Structure, model_structure
+from indicial.identification.term_model import term_model, term_names
 from indicial.identification.to_centre_of_gravity import to_centre_of_gravity
 
 __all__ = [
@@ -93,5 +94,7 @@ __all__ = [
     "relative_peak_factor",
     "spline",
     "state_model",
+    "term_model",
+    "term_names",
     "to_centre_of_gravity",
 ]
