@@ -73,11 +73,11 @@ class Known(_Walk):
     """A walk along a D that is known."""
 
     def __init__(self, cost, centre, positive=False):
-        self.seen, self.centre, self.least, self.cost = {}, centre, 0.0, cost
+        self.seen, self.better, self.centre, self.least, self.cost = {centre: 0.0}, {}, centre, 0.0, cost
         self.chosen = Parameter("b", centre, positive=positive)
 
-    def _cost(self, value):
-        return self.cost(value)
+    def _held(self, value):
+        return self.cost(value), {}
 
 
 def logarithmic(width):
@@ -118,8 +118,25 @@ def test_a_fit_that_was_not_at_its_minimum_is_told():
 
     fit = fit_manoeuvres([whole(simulated(3))], parameters())
     moved = tuple(replace(e, value=e.value + 3.0 * e.standard_error) if e.name == "Cm_q" else e for e in fit.parameters)
-    with pytest.raises(DivergenceError, match=r"Cm_q held at .* local minimum"):
-        profile_likelihood(replace(fit, parameters=moved), parameters(), "Cm_q")
+    found = profile_likelihood(replace(fit, parameters=moved), parameters(), "Cm_q")
+    straight = profile_likelihood(fit, parameters(), "Cm_q")
+    assert "local minimum" in found.summary()
+    assert found.better["Cm_q"] == pytest.approx(fit["Cm_q"].value, abs=1.5 * fit["Cm_q"].standard_error)
+    assert found.lower < straight.lower
+    assert found.upper > straight.upper
+    assert not straight.better
+
+
+def test_of_two_minima_the_interval_holds_both():
+    """J is least at 3, and the fit ended at 1; between them J rises, but not to the level of 95%."""
+
+    def cost(value):
+        return 0.5 * min((value - 1.0) ** 2, (value - 3.0) ** 2 - 0.4)
+
+    walk = Known(cost, 1.0)
+    assert walk.end(1.0, 1.96, 1.0) == pytest.approx(3.0 + math.sqrt(1.96**2 + 0.4), rel=0.02)
+    assert walk.end(-1.0, 1.96, 1.0) == pytest.approx(-0.96, rel=0.02)
+    assert walk.better == {"b": pytest.approx(3.0, abs=0.7)}
 
 
 def test_what_cannot_be_profiled_is_refused():

@@ -5,13 +5,16 @@ freedom at the true value, whatever the unknown is called or scaled, and the int
 its quantile. The bound is the parabola of the same curvature at the best fit: it agrees where the model is linear in
 the unknown as far as the interval goes. The noise is that of the fit. Source: Venzon & Moolgavkar, Appl. Stat. 37
 (1988) 87; Raue et al., Bioinformatics 25 (2009) 1923.
+
+Where the fit was at a local minimum D is below 0 somewhere. Such values belong to the interval, which is then as wide
+as the true one or wider, as J is counted from too high a level.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -49,6 +52,9 @@ class Profile:
         converge before it has. The lower end of a positive parameter is 0 at least.
     values, statistic : ndarray
         Points looked at, and D there, in order, shape (n,).
+    better : mapping
+        Values of all unknowns where J is least, if it is less than where the fit ended: the fit was at a local minimum,
+        and is best made again from there. Empty otherwise.
     """
 
     name: str
@@ -59,6 +65,7 @@ class Profile:
     upper: float
     values: Array
     statistic: Array
+    better: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def bound(self) -> tuple[float, float]:
@@ -77,8 +84,15 @@ class Profile:
         """The interval, and whether the bound's will do."""
         low, high = self.bound
         word = "the bound agrees" if self.trusts_bound else f"NOT the bound's, {low:.5g} to {high:.5g}"
-        return (
+        text = (
             f"{self.name}: {self.estimate:.5g}, {self.level:.0%} interval {self.lower:.5g} to {self.upper:.5g}; {word}"
+        )
+        if not self.better:
+            return text
+        less = -0.5 * float(self.statistic.min())
+        return (
+            f"{text}; at {self.better[self.name]:.5g} J is {less:.3g} lower: the fit is at a local minimum, fit again "
+            "from the values in `better`"
         )
 
     def plot(self) -> Figure:
@@ -124,8 +138,6 @@ def profile_likelihood(
     ------
     InputError
         If there is no such parameter, it has a value for each record or a prior, or the level is none.
-    DivergenceError
-        If the others fit the records better with the parameter held elsewhere: the fit was not at the least J.
     """
     if not 0.0 < level < 1.0:
         raise InputError(f"level is {level}, must be between 0 and 1")
@@ -148,6 +160,7 @@ def profile_likelihood(
         ends[1],
         np.array([v for v, _ in seen]),
         np.array([d for _, d in seen]),
+        walk.better,
     )
 
 
@@ -161,29 +174,28 @@ class _Walk:
         self.noise = Noise(fit.noise, fit.memory)
         self.start = {e.name: e.value for e in (*fit.parameters, *fit.start_values)}
         self.centre = self.start[chosen.name]
-        self.least = self._cost(self.centre)
+        self.least, _ = self._held(self.centre)
         self.seen = {self.centre: 0.0}
+        self.better: dict[str, float] = {}
 
     def statistic(self, value: float) -> float:
         """D at a value; infinite where no fit converges."""
         if value not in self.seen:
             try:
-                found = 2.0 * (self._cost(value) - self.least)
+                cost, others = self._held(value)
             except DivergenceError:
                 return math.inf
-            if found < -_LOWER:
-                raise DivergenceError(
-                    f"with {self.chosen.name} held at {value:.6g} J is {-0.5 * found:.3g} lower than where the fit "
-                    "ended: that was a local minimum; fit again from that value"
-                )
-            self.seen[value] = max(found, 0.0)
+            found = 2.0 * (cost - self.least)
+            if found < min(-_LOWER, *self.seen.values()):
+                self.better = {**others, self.chosen.name: value}
+            self.seen[value] = found
         return self.seen[value]
 
     def end(self, sign: float, wanted: float, error: float) -> float:
         """Where the square root of D is `wanted`, on one side: bracketed, then by false position on the root."""
 
         def root(away: float) -> float:
-            return math.sqrt(self.statistic(self.centre + sign * away * error))
+            return math.sqrt(max(self.statistic(self.centre + sign * away * error), 0.0))
 
         wall = self.centre / error if self.chosen.positive and sign < 0.0 else math.inf
         farthest = min(_FARTHEST, (1.0 - _CLOSE) * wall)
@@ -206,8 +218,8 @@ class _Walk:
                 outside, outer = trial, found
         return self.centre + sign * outside * error if math.isfinite(outer) else sign * math.inf
 
-    def _cost(self, value: float) -> float:
-        """Least J with the parameter held; begins where the fit ended."""
+    def _held(self, value: float) -> tuple[float, dict[str, float]]:
+        """Least J with the parameter held, and the others there; begins where the fit ended."""
         held = [_knowing(m, self.chosen.name, value) for m in self.fit.manoeuvres]
         problem = Problem(held, self.others, self.threads)
         problem.start = np.array([self.start.get(n, problem.start[i]) for i, n in enumerate(problem.names)])
@@ -216,8 +228,8 @@ class _Walk:
         if point is None:
             raise DivergenceError("not finite")
         cost: list[float] = []
-        minimise(problem, point, self.noise, cost)
-        return cost[-1]
+        end = minimise(problem, point, self.noise, cost)
+        return cost[-1], dict(zip(problem.names, end.unknowns.tolist(), strict=True))
 
 
 def _knowing(manoeuvre: Manoeuvre, name: str, value: float) -> Manoeuvre:
