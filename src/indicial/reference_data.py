@@ -82,7 +82,8 @@ def find_case(path: str | Path) -> Path:
     raise InputError(f"{path}: no such case file; packaged cases: {known}")
 
 
-_AIRCRAFT_KEYS = {"schema_version", "aircraft_class", "derivatives"}
+_AIRCRAFT_KEYS = {"aircraft_class", "derivatives"}
+_FLIGHT_TEST_KEYS = {"records", "longitudinal"}
 
 
 def find_aircraft(path: str | Path) -> Path | None:
@@ -90,16 +91,25 @@ def find_aircraft(path: str | Path) -> Path | None:
 
     ``data/aircraft/boeing_747.toml``, ``boeing_747.toml`` and ``boeing_747`` all find the packaged one.
     """
+    return _find(path, "aircraft", _AIRCRAFT_KEYS)
+
+
+def find_flight_test(path: str | Path) -> Path | None:
+    """A flight test file, as `find_aircraft`; the packaged ones are in ``data/flight_tests``."""
+    return _find(path, "flight_tests", _FLIGHT_TEST_KEYS)
+
+
+def _find(path: str | Path, folder: str, keys: set[str]) -> Path | None:
     given = Path(path)
     if given.is_file():
         try:
             content = tomllib.loads(given.read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return None
-        return given if _AIRCRAFT_KEYS & set(content) else None
+        return given if keys & set(content) else None
     name = given.name if given.suffix == ".toml" else f"{given.name}.toml"
-    packaged = data_folder() / "aircraft" / name
-    if not given.is_dir() and given.parent in (Path(), Path("data/aircraft")) and packaged.is_file():
+    packaged = data_folder() / folder / name
+    if not given.is_dir() and given.parent in (Path(), Path("data") / folder) and packaged.is_file():
         return Path(str(packaged))
     return None
 

@@ -88,3 +88,14 @@ def test_a_derivative_lost_in_its_error_is_named_and_a_good_one_is_not():
     (finding,) = undetermined(("CN_alpha", "CA_0"), np.array([3.0, 0.5]), covariance)
     assert finding.startswith("the record hardly determines CN_alpha")
     assert undetermined(("CN_alpha", "CA_0"), np.array([12.0, 0.5]), covariance) == ()
+
+
+def test_what_is_close_but_determined_is_not_called_inseparable():
+    rng = np.random.default_rng(3)
+    wave = rng.standard_normal((50, 2))
+    x = np.stack([wave[:, 0], wave[:, 0] + 0.04 * wave[:, 1], rng.standard_normal(50)], axis=1)
+    names, values = ("CX_alpha", "CX_alpha^2", "Cm_0"), np.array([1.0, 3.0, 0.5])
+    (sure,) = undetermined(names, values, cramer_rao(x / 0.01))
+    assert "separates by small differences only" in sure
+    told = undetermined(names, values, cramer_rao(x / 1.0))
+    assert any("cannot separate" in finding for finding in told)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import indicial
-from indicial.case import AircraftFile, case_reference
+from indicial.case import AircraftFile, FlightTest, case_reference
 from indicial.cli.commands import app
 from indicial.pipeline import ALL_STAGES
 from indicial.pipeline.stages import DERIVING
@@ -47,6 +47,10 @@ def test_case_file_page_is_the_one_that_the_models_make():
 
 def test_aircraft_file_page_is_the_one_that_the_models_make():
     assert case_reference(AircraftFile) in (ROOT / "docs" / "aircraft_file.md").read_text(encoding="utf-8")
+
+
+def test_flight_test_page_is_the_one_that_the_models_make():
+    assert case_reference(FlightTest) in (ROOT / "docs" / "flight_test.md").read_text(encoding="utf-8")
 
 
 def test_every_stage_and_command_is_in_the_guide():

@@ -9,6 +9,7 @@ import typer
 
 from indicial.cli import damping as _damping  # noqa: F401  (they add their commands to the app)
 from indicial.cli import flights as _flights  # noqa: F401
+from indicial.cli import identify as _identify  # noqa: F401
 from indicial.cli import rom as _rom  # noqa: F401
 from indicial.cli import rom_files as _rom_files  # noqa: F401
 from indicial.cli import study as _study  # noqa: F401

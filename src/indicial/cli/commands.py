@@ -124,12 +124,6 @@ def fly(case: Target, output: Output = None, verbose: Verbose = False) -> None:
     perform(case, output, None, verbose, ("fly",), resume=False)
 
 
-@app.command(epilog="**Example:** `indicial identify runs/basic_finner_quick`")
-def identify(case: Target, output: Output = None, verbose: Verbose = False) -> None:
-    """Measure the flight as a spark range does, with noise, and identify its derivatives."""
-    perform(case, output, None, verbose, ("identify",), resume=False)
-
-
 @app.command(epilog="**Example:** `indicial compare runs/basic_finner_quick`")
 def compare(case: Target, output: Output = None, verbose: Verbose = False) -> None:
     """Set every derivative by every method beside the measured ones: results.json and a table."""

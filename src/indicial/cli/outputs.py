@@ -22,8 +22,12 @@ def to_file(parameter: typer.CallbackParam, value: Path | None) -> Path | None:
 
 def to_folder(parameter: typer.CallbackParam, value: Path | None) -> Path | None:
     """Refuse a folder that is a file, or is to lie in one."""
-    if value is not None:
-        _refuse_files((value, *value.parents), f"{parameter.opts[0]} must name a folder")
+    return None if value is None else to_be_folder(value, parameter.opts[0])
+
+
+def to_be_folder(value: Path, option: str) -> Path:
+    """Refuse, in the name of an option, a folder that is a file, or is to lie in one."""
+    _refuse_files((value, *value.parents), f"{option} must name a folder")
     return value
 
 

@@ -24,6 +24,7 @@ WHITE_LEVEL = 0.01
 
 _MOST_CORRELATED = 0.98
 _COLLINEAR = 30.0  # condition index from which Belsley, Kuh & Welsch speak of moderate to strong dependence
+_SEVERE = 100.0  # condition index from which they speak of a serious one
 _SHARE = 0.5  # of the variance of an estimate: what they ask for to name it
 _LINKED = 0.1  # of the projector onto what is not told: smaller entries are no link
 _TOLD = 0.1  # of the error alone: so well known a combination is worth naming
@@ -95,7 +96,8 @@ def undetermined(names: tuple[str, ...], values: Array, covariance: Array) -> tu
     directions v_k. Those whose condition index ``sqrt(l_max/l_k)`` is above 30 are what the record does not tell, and a
     derivative takes part if they make more than half of its variance, ``sum_k v_jk^2/l_k`` (the variance-decomposition
     proportions of Belsley, Kuh & Welsch). Those that go together are named together, with the combination of them that
-    the record does tell, if there is one.
+    the record does tell, if there is one. Where the index is below 100 and each is determined all the same (standard
+    errors below half of the values), it is told that small differences separate them.
 
     Parameters
     ----------
@@ -117,7 +119,8 @@ def undetermined(names: tuple[str, ...], values: Array, covariance: Array) -> tu
     for group in _groups(directions, powers, lost):
         dependent.update(group)
         worst = max(index[k] for k in np.flatnonzero(lost) if np.max(np.abs(directions[group, k])) > _LINKED)
-        findings.append(_dependence([names[i] for i in group], worst, covariance[np.ix_(group, group)]))
+        weak = worst > _SEVERE or bool(np.any(errors[group] > _WEAK * np.abs(values[group])))
+        findings.append(_dependence([names[i] for i in group], worst, covariance[np.ix_(group, group)], weak))
     for i, (name, value, error) in enumerate(zip(names, values, errors, strict=True)):
         if i not in dependent and error > _WEAK * abs(value):
             findings.append(f"the record hardly determines {name}: {value:.4g} +- {error:.2g}")
@@ -138,10 +141,11 @@ def _groups(directions: Array, powers: Array, lost: NDArray[np.bool_]) -> list[l
     return [group for group in groups if len(group) > 1]
 
 
-def _dependence(names: list[str], index: float, covariance: Array) -> str:
+def _dependence(names: list[str], index: float, covariance: Array, weak: bool) -> str:
     errors = np.sqrt(np.diag(covariance))
     listed = ", ".join(f"{name} +- {error:.2g}" for name, error in zip(names, errors, strict=True))
-    text = f"the record cannot separate {' and '.join(names)} (condition index {index:.0f}; {listed})"
+    how = "cannot separate" if weak else "separates by small differences only"
+    text = f"the record {how} {' and '.join(names)} (condition index {index:.0f}; {listed})"
     if len(names) == 2:
         text += f", correlation {covariance[0, 1] / (errors[0] * errors[1]):.5f}"
         total = math.sqrt(max(covariance.sum(), 0.0))

@@ -15,6 +15,7 @@ from indicial.identification.coloured import predictors
 from indicial.identification.estimate import Estimate
 from indicial.identification.outliers import outlier_limit, outlying, robust_scale
 from indicial.identification.problem import Manoeuvre
+from indicial.identification.record import shown_unit
 from indicial.identification.unit_guess import guess_unit
 
 if TYPE_CHECKING:
@@ -213,9 +214,11 @@ class OutputErrorFit:
             rows, 2, figsize=(11, 1.0 + 1.6 * rows), sharex=True, layout="constrained", squeeze=False
         )
         for i, channel in enumerate(m.model.channels):
-            axes[i, 0].plot(m.time, m.measured[:, i], ".", ms=2, label="measured")
-            axes[i, 0].plot(m.time, m.measured[:, i] - residuals[:, i], label="fitted")
-            axes[i, 0].set(ylabel=channel)
+            unit, factor = shown_unit(channel)
+            measured = factor * m.measured[:, i]
+            axes[i, 0].plot(m.time, measured, ".", ms=2, label="measured")
+            axes[i, 0].plot(m.time, measured - factor * residuals[:, i], label="fitted")
+            axes[i, 0].set(ylabel=f"{channel} [{unit}]" if unit else channel)
             sd = m.standard_deviations[i] * self.noise[channel]
             axes[i, 1].plot(m.time, residuals[:, i] / sd, ".", ms=2)
         axes[0, 0].legend(fontsize="small")

@@ -316,8 +316,8 @@ def check_channel(name: str) -> None:
 
 
 def shown_unit(name: str) -> tuple[str, float]:
-    """The unit in which a channel is shown to readers, and how many of it its SI unit is."""
-    unit = CHANNEL_UNITS[name]
+    """The unit in which a channel, of a range too, is shown to readers, and how many of it its SI unit is."""
+    unit = CHANNEL_UNITS.get(name, "rad")  # a range's own channels are yaw, pitch and roll
     return ("", 1.0) if unit == "1" else _SHOWN.get(unit, (unit, 1.0))
 
 

@@ -62,10 +62,12 @@ _SYMBOLS = {
     "Cm": "C_m",
     "CA": "C_A",
     "Cl": "C_l",
+    "CX": "C_X",
     "CY": "C_Y",
+    "CZ": "C_Z",
     "Cn": "C_n",
 }
-_SUBSCRIPTS = {"alpha": r"\alpha", "alphadot": r"\dot{\alpha}", "beta": r"\beta", "0": "0"}
+_SUBSCRIPTS = {"alpha": r"\alpha", "alphadot": r"\dot{\alpha}", "beta": r"\beta"}
 
 
 def symbol(name: str) -> str:
@@ -79,7 +81,15 @@ def _one_symbol(name: str) -> str:
     if not motion:
         return letter
     base, _, sub = letter.partition("_")
-    return f"{base}_{{{sub}{_SUBSCRIPTS.get(motion, motion)}}}"
+    factors = r"\,".join(_factor(factor) for factor in motion.split("*"))
+    return f"{base}_{{{sub}{factors}}}"
+
+
+def _factor(factor: str) -> str:
+    """A factor of a term, such as ``alpha^2`` or ``elevator``, as a subscript."""
+    base, _, power = factor.partition("^")
+    letters = _SUBSCRIPTS.get(base, base if len(base) == 1 else rf"\,\mathrm{{{base}}}")
+    return f"{letters}^{power}" if power else letters
 
 
 @contextmanager
