@@ -36,6 +36,7 @@ def identify(source: Source, output: Output = None, verbose: Verbose = False) ->
         return
     import logging
 
+    from indicial.cli.console import ConsoleReporter
     from indicial.cli.outputs import to_be_folder
     from indicial.pipeline.flight_test import reduce_flight_test
     from indicial.pipeline.flight_test_report import write_flight_test
@@ -43,6 +44,7 @@ def identify(source: Source, output: Output = None, verbose: Verbose = False) ->
     if verbose:
         logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s: %(message)s")
     into = to_be_folder(Path("runs") / file.stem if output is None else Path(output), "--output")
-    result = reduce_flight_test(file)
+    with ConsoleReporter() as reporter:
+        result = reduce_flight_test(file, reporter)
     typer.echo(result.summary())
     typer.echo(f"report: {write_flight_test(result, into)}")

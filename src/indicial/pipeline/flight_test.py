@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import logging
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -34,8 +34,7 @@ from indicial.identification import (
     term_names,
     to_centre_of_gravity,
 )
-
-log = logging.getLogger(__name__)
+from indicial.pipeline.progress import LogReporter, Reporter
 
 _IN_PLANE = ("V", "alpha", "theta", "q", "ax", "az")
 _OUT_OF_PLANE = ("beta", "phi", "p", "r", "ay")
@@ -142,13 +141,15 @@ class FlightTestResult:
         }
 
 
-def reduce_flight_test(path: str | Path) -> FlightTestResult:
+def reduce_flight_test(path: str | Path, reporter: Reporter | None = None) -> FlightTestResult:
     """Diagnosis, compatibility, equation error and output error of the records that a flight test file names.
 
     Parameters
     ----------
     path : str or Path
         See docs/flight_test.md; records and map are looked for beside it.
+    reporter : Reporter, optional
+        Told what is being done; the log if not given.
 
     Raises
     ------
@@ -158,11 +159,19 @@ def reduce_flight_test(path: str | Path) -> FlightTestResult:
         If the fit does not converge.
     """
     test, folder = read_flight_test(path), Path(path).parent
+    told: Reporter = LogReporter() if reporter is None else reporter
+    told.start("Records")
+    begun = time.monotonic()
     records = []
-    for file in test.records:
-        log.info("reading %s", file)
+    for done, file in enumerate(test.records):
+        told.update(done / len(test.records), file)
         records.append(_reduced(test, read_flight_record(folder / file, folder / test.map), Path(file).stem))
-    return _fitted(test, tuple(records))
+    told.finish(time.monotonic() - begun, f"{sum(len(one.record) for one in records)} samples")
+    told.start("Output error")
+    begun = time.monotonic()
+    result = _fitted(test, tuple(records))
+    told.finish(time.monotonic() - begun, f"{len(result.fit.parameters)} values in {len(result.fit.cost)} steps")
+    return result
 
 
 def _reduced(test: FlightTest, raw: FlightRecord, name: str) -> ReducedRecord:
