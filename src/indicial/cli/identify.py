@@ -46,5 +46,6 @@ def identify(source: Source, output: Output = None, verbose: Verbose = False) ->
     into = to_be_folder(Path("runs") / file.stem if output is None else Path(output), "--output")
     with ConsoleReporter() as reporter:
         result = reduce_flight_test(file, reporter)
+        page = write_flight_test(result, into, reporter)
     typer.echo(result.summary())
-    typer.echo(f"report: {write_flight_test(result, into)}")
+    typer.echo(f"report: {page}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING
 import indicial
 from indicial.files import write_text
 from indicial.pipeline.flight_test import FlightTestResult, ReducedRecord
+from indicial.pipeline.progress import LogReporter, Reporter
 from indicial.report.html import Chapter, Grid, Picture, write_html
 from indicial.report.identified import INTERVAL, estimates_figure
 from indicial.report.style import figure_style, save
@@ -18,16 +20,22 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def write_flight_test(result: FlightTestResult, folder: str | Path) -> Path:
+def write_flight_test(result: FlightTestResult, folder: str | Path, reporter: Reporter | None = None) -> Path:
     """Write ``flight_test.json``, ``summary.txt``, ``figures/`` and ``report.html`` into a folder; the page's path."""
-    into = Path(folder)
+    into, told, begun = Path(folder), LogReporter() if reporter is None else reporter, time.monotonic()
+    told.start("Figures and report")
     write_text(into / "flight_test.json", json.dumps(result.to_dict(), indent=1, allow_nan=False))
     write_text(into / "summary.txt", result.summary() + "\n")
-    pictures = {name: save(figure, into / "figures" / f"{name}.png") for name, figure in _figures(result)}
+    expected, pictures = 1 + 3 * len(result.records), dict[str, Path]()
+    for name, figure in _figures(result):
+        told.update(len(pictures) / expected, name)
+        pictures[name] = save(figure, into / "figures" / f"{name}.png")
     chapters = [_derivatives(result, pictures)]
-    chapters += [_record(result, number, one, pictures) for number, one in enumerate(result.records)]
-    write_html(into / "report.html", result.test.title, _lead(result), chapters, {"indicial": indicial.__version__})
-    return into / "report.html"
+    chapters += [_record(one, pictures) for one in result.records]
+    page = into / "report.html"
+    write_html(page, result.test.title, _lead(result), chapters, {"indicial": indicial.__version__})
+    told.finish(time.monotonic() - begun, str(page))
+    return page
 
 
 def _figures(result: FlightTestResult) -> Iterator[tuple[str, Figure]]:
@@ -105,7 +113,7 @@ def _derivatives(result: FlightTestResult, pictures: dict[str, Path]) -> Chapter
     )
 
 
-def _record(result: FlightTestResult, number: int, one: ReducedRecord, pictures: dict[str, Path]) -> Chapter:
+def _record(one: ReducedRecord, pictures: dict[str, Path]) -> Chapter:
     """What one record was like, what was wrong with it, and how it is fitted."""
     text = [finding.summary() for finding in one.diagnosis.findings] or [
         "Its channels by themselves: nothing is wrong."
