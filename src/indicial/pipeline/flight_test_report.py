@@ -107,7 +107,11 @@ def _derivatives(result: FlightTestResult, pictures: dict[str, Path]) -> Chapter
         text,
         [
             Grid(("", "output error", "equation error", "expected", "verdict"), rows),
-            Grid(("channel", "noise / stated", "residuals"), noise, "Noise found, against what the map states"),
+            Grid(
+                ("channel", "noise / stated", "residuals"),
+                noise,
+                "Noise found, against what the map states or, where it states none, the roughness of the samples",
+            ),
         ],
         [Picture(pictures["derivatives"], f"Estimates and {INTERVAL} standard errors.")],
     )
