@@ -2,10 +2,10 @@
 
 An aircraft's record: 500 samples of four channels, four derivatives, the initial state known, from start values 30%
 off. Ours estimates the size and the colour of the noise besides; the peer takes it as stated. On one thread. The peer
-runs as it comes, with dynamics in Python, an adaptive integrator and differences (it can take gradients by JAX, which
-is not tried), and is left out where it is not installed. A range's: eight shots of 54 stations, ten coefficients in
-common, twelve start values each, from 20% off. Compiling a model is left out of ours: a second or two the first time,
-then kept on disk; so is importing the peer.
+runs as it comes, with dynamics in Python, an adaptive integrator and differences, and, where JAX is installed, with
+gradients by JAX of Runge-Kutta steps, which it compiles anew for each fit; without the peer there is no comparison. A
+range's: eight shots of 54 stations, ten coefficients in common, twelve start values each, from 20% off. Compiling a
+model is left out of ours: a second or two the first time, then kept on disk; so is importing the peer.
 """
 
 from __future__ import annotations
@@ -35,11 +35,14 @@ def measure() -> list[Figure]:
     peer = longitudinal.peer_fit(record, FAR)
     found = longitudinal.fit(record, start_known=True, factor=FAR)
     apart = max(abs(found[n].value - peer.parameters[n]) / peer.stderr[n] for n in longitudinal.TRUTH)
-    return [
-        *figures,
+    figures += [
         Figure.at_least("aeroid's output error over ours", taken / ours, 15.0),
         Figure.at_most("estimates apart, in standard errors", apart, 0.5),
     ]
+    if importlib.util.find_spec("jax") is None:
+        return [*figures, Figure("JAX is not installed: aeroid's gradients by it not compared", math.nan, "")]
+    by_jax = best_time(lambda: longitudinal.peer_fit(record, FAR, "jax"), repeats=2)
+    return [*figures, Figure.at_least("aeroid's, gradients by JAX, over ours", by_jax / ours, 15.0)]
 
 
 def _range_shots() -> Figure:

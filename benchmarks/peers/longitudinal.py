@@ -5,6 +5,7 @@ Both fit one model: velocity, pitch rate and pitch angle under the same loads; 5
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Mapping
 from functools import cache
@@ -80,17 +81,25 @@ def fit(seen: FlightRecord, *, start_known: bool = False, factor: float = 1.0) -
     return fit_manoeuvres([manoeuvre], [Parameter(n, factor * v) for n, v in TRUTH.items()], threads=1)
 
 
+_SCALAR = (math.sqrt, math.atan2, math.sin, math.cos)
+"""Quicker than numpy's for one number."""
+
+
 @cache
-def _peer_model() -> Any:
-    """The same motion for aeroid; the record holds no sideways motion."""
+def _peer_model(gradient: str) -> Any:
+    """The same motion for aeroid, by numpy or by JAX; the record holds no sideways motion."""
     import aeroid
+
+    xp: Any = importlib.import_module("jax.numpy" if gradient == "jax" else "numpy")
 
     density = aircraft().atmosphere.air(0.0).density
     density = float(ca.DM(density)) if not isinstance(density, float) else density
 
+    root, arctan2, sin, cos = (xp.sqrt, xp.arctan2, xp.sin, xp.cos) if gradient == "jax" else _SCALAR
+
     def loads(x: Array, u: Array, p: Mapping[str, float]) -> tuple[float, float, float]:
-        speed = math.hypot(x[0], x[1])
-        if speed == 0.0:
+        speed = root(x[0] ** 2 + x[1] ** 2)
+        if gradient != "jax" and speed == 0.0:  # as the peer tries its model once
             return 0.0, 0.0, 0.0
         push = 0.5 * density * speed**2 * AREA
         incidence, drag = x[1] / speed, 0.5 * density * speed * AREA * CD_0
@@ -102,8 +111,8 @@ def _peer_model() -> Any:
 
     def dynamics(t: float, x: Array, u: Array, p: Mapping[str, float]) -> Array:
         along, down, moment = loads(x, u, p)
-        sine, cosine = math.sin(x[3]), math.cos(x[3])
-        return np.array(
+        sine, cosine = sin(x[3]), cos(x[3])
+        return xp.array(
             [
                 along - GRAVITY * sine - x[2] * x[1],
                 down + GRAVITY * cosine + x[2] * x[0],
@@ -113,7 +122,7 @@ def _peer_model() -> Any:
         )
 
     def measurement(t: float, x: Array, u: Array, p: Mapping[str, float]) -> Array:
-        return np.array([math.atan2(x[1], x[0]), x[2], x[3], loads(x, u, p)[1]])
+        return xp.array([arctan2(x[1], x[0]), x[2], x[3], loads(x, u, p)[1]])
 
     return aeroid.Model(
         states=("u", "w", "pitch_rate", "pitch_angle"),
@@ -125,17 +134,22 @@ def _peer_model() -> Any:
     )
 
 
-def peer_fit(seen: FlightRecord, factor: float = 1.0) -> Any:
-    """aeroid's output error of the same record from the same start values, the initial state known."""
+def peer_fit(seen: FlightRecord, factor: float = 1.0, gradient: str = "fd") -> Any:
+    """aeroid's output error of the same record from the same start values, the initial state known.
+
+    Derivatives by differences of an adaptive integrator's flights ("fd", as it comes), or by JAX from Runge-Kutta steps
+    from sample to sample ("jax"), as ours are.
+    """
     import aeroid
 
     data = aeroid.FlightData(seen.time, {"elevator": ELEVATOR, **{c: seen[c] for c in CHANNELS}})
     start = [60.0 * math.cos(0.05), 60.0 * math.sin(0.05), 0.0, 0.05]
     return aeroid.identify(
-        _peer_model(),
+        _peer_model(gradient),
         data,
         list(TRUTH),
         initial_guess={n: factor * v for n, v in TRUTH.items()},
         weights={c: 1.0 / size for c, size in NOISE.items()},
         x0=start,
+        gradient=gradient,
     )
