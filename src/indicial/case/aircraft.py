@@ -29,6 +29,11 @@ class AircraftReference(Section):
     span_m: Annotated[Positive, Field(description="span b: rolling and yawing moment, p b/2V and r b/2V")]
     area_m2: Annotated[Positive, Field(description="wing area S")]
 
+    @property
+    def quantities(self) -> ReferenceQuantities:
+        """Chord, span and area, about the centre of gravity."""
+        return ReferenceQuantities(self.chord_m, self.area_m2, lateral_length=self.span_m)
+
 
 class AircraftMass(Section):
     """Mass properties, about the centre of gravity, in the axes of the derivatives."""
@@ -38,6 +43,12 @@ class AircraftMass(Section):
     Iyy_kg_m2: Annotated[Positive, Field(description="moment of inertia in pitch")]
     Izz_kg_m2: Annotated[Positive, Field(description="moment of inertia in yaw")]
     Ixz_kg_m2: Annotated[float, Field(description="product of inertia, the integral of x z dm")] = 0.0
+
+    def vehicle(self, title: str, reference: ReferenceQuantities) -> Vehicle:
+        """Mass and inertia, about the centre of gravity."""
+        x, y, z, xz = self.Ixx_kg_m2, self.Iyy_kg_m2, self.Izz_kg_m2, self.Ixz_kg_m2
+        inertia = np.array([[x, 0.0, -xz], [0.0, y, 0.0], [-xz, 0.0, z]])
+        return Vehicle(title, self.mass_kg, inertia, reference, (0.0, 0.0, 0.0))
 
 
 class AircraftCondition(Section):
@@ -87,17 +98,12 @@ class AircraftFile(Section):
     @property
     def reference_quantities(self) -> ReferenceQuantities:
         """Chord, span and area, about the centre of gravity."""
-        one = self.reference
-        return ReferenceQuantities(one.chord_m, one.area_m2, lateral_length=one.span_m)
+        return self.reference.quantities
 
     @property
     def vehicle(self) -> Vehicle:
         """Mass and inertia."""
-        m = self.mass
-        inertia = np.array(
-            [[m.Ixx_kg_m2, 0.0, -m.Ixz_kg_m2], [0.0, m.Iyy_kg_m2, 0.0], [-m.Ixz_kg_m2, 0.0, m.Izz_kg_m2]]
-        )
-        return Vehicle(self.title, m.mass_kg, inertia, self.reference_quantities, (0.0, 0.0, 0.0))
+        return self.mass.vehicle(self.title, self.reference.quantities)
 
     def aerodynamics(self, speed: float | None = None) -> BodyAxisAerodynamics:
         """The derivatives, those of the speed about `speed` [m/s] (the file's if not given)."""

@@ -5,13 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-import numpy as np
 from pydantic import Field, model_validator
 
 from indicial.case.aircraft import AircraftMass, AircraftReference
 from indicial.case.model import Positive, Section
 from indicial.case.reading import parse, read_text
-from indicial.conventions import ReferenceQuantities
 from indicial.flightsim import Vehicle
 
 Place = Annotated[list[float], Field(min_length=3, max_length=3)]
@@ -111,12 +109,7 @@ class FlightTest(Section):
     @property
     def vehicle(self) -> Vehicle:
         """Mass, inertia and reference quantities, about the centre of gravity."""
-        one, m = self.reference, self.mass
-        reference = ReferenceQuantities(one.chord_m, one.area_m2, lateral_length=one.span_m)
-        inertia = np.array(
-            [[m.Ixx_kg_m2, 0.0, -m.Ixz_kg_m2], [0.0, m.Iyy_kg_m2, 0.0], [-m.Ixz_kg_m2, 0.0, m.Izz_kg_m2]]
-        )
-        return Vehicle(self.title, m.mass_kg, inertia, reference, (0.0, 0.0, 0.0))
+        return self.mass.vehicle(self.title, self.reference.quantities)
 
 
 def read_flight_test(path: str | Path) -> FlightTest:
