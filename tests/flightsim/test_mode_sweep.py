@@ -1,15 +1,18 @@
 """Modes over Mach number and altitude, and damping over reduced frequency with memory."""
 
+import json
 import math
 
 import control
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from flightsim.support import DENSITY, FINNER, SPEED, derivative_model, first_order_lag
 from flightsim.test_aircraft import SPEED as CRUISE
 from flightsim.test_aircraft import boeing_747
 from flightsim.test_linear import level
+from indicial.cli import app
 from indicial.derivatives import Derivative, DerivativeTable
 from indicial.errors import InputError
 from indicial.flightsim import (
@@ -262,3 +265,18 @@ def test_an_aircraft_file_over_the_envelope_is_the_aircraft_at_each_point() -> N
     for name in sweep.names:
         assert sweep[name][0, 0] == pytest.approx(one.all_modes[name].eigenvalue, rel=1e-9), name
     assert one.steady.parameters["CX_alpha"] == pytest.approx(0.2193 * one.steady.parameters["CZ_0"] / -0.654, rel=1e-3)
+
+
+def test_the_command_writes_a_sweep_whose_points_are_single_flights(tmp_path):
+    file = tmp_path / "modes.json"
+    words = ["damping", "boeing_747", "--machs", "0.7:0.9:3", "--altitudes", "9000:12000:2", "--json", str(file)]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.output
+    assert "modes at 2 altitudes from 9000 to 12000 m, 3 Mach numbers from 0.7 to 0.9" in done.output
+    assert "derivatives are those of Mach 0.8, held" in done.output
+    told = json.loads(file.read_text(encoding="utf-8"))
+    single = damping_of_aircraft(find_aircraft("boeing_747"), mach=0.9, altitude=9000.0)
+    for one in single.modes:
+        swept = told["modes"][one.mode.name]
+        assert swept["real_1_s"][0][2] == pytest.approx(one.mode.eigenvalue.real, rel=1e-9)
+        assert swept["imaginary_rad_s"][0][2] == pytest.approx(abs(one.mode.eigenvalue.imag), rel=1e-9)

@@ -66,6 +66,9 @@ def test_wrong_input_gives_one_line_and_exit_code_2(tmp_path):
         ("damping", "boeing_747", "--mach", "-1"): "Mach number is -1.0, must be positive",
         ("damping", "boeing_747", "--roll-rate", "3"): "--roll-rate is for missiles",
         ("damping", "boeing_747", "--altitude", "1e6"): "altitude must be within",
+        ("damping", "boeing_747", "--machs", "0.6-0.9"): "--machs is '0.6-0.9', must be FROM:TO:NUMBER",
+        ("damping", "boeing_747", "--altitudes", "0:1:2"): "--altitudes needs --machs",
+        ("damping", "boeing_747", "--mach", "0.8", "--machs", "0.6:0.9:3"): "give either",
     }
     for arguments, message in wrong.items():
         done = indicial_command(*arguments, cwd=tmp_path)

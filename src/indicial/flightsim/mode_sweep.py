@@ -17,7 +17,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -55,6 +55,8 @@ class ModeSweep:
         [1/s], NaN where there is no such flight or no such mode, shape (m, n, n_modes).
     refused : mapping
         Why there is no flight, by (altitude, Mach).
+    notes : tuple of str
+        What a reader must know of the model that was swept.
     """
 
     machs: Array
@@ -62,6 +64,7 @@ class ModeSweep:
     names: tuple[str, ...]
     eigenvalues: Complex
     refused: Mapping[tuple[float, float], str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Complex:
         """Eigenvalues of one mode, shape (m, n)."""
@@ -78,10 +81,8 @@ class ModeSweep:
 
     def summary(self) -> str:
         """Where each mode is least damped, and where it grows."""
-        lines = [
-            f"modes at {self.altitudes.size} altitudes from {self.altitudes[0]:g} to {self.altitudes[-1]:g} m, "
-            f"{self.machs.size} Mach numbers from {self.machs[0]:g} to {self.machs[-1]:g}"
-        ]
+        heights, machs = _extent(self.altitudes, "altitude"), _extent(self.machs, "Mach number")
+        lines = [f"modes at {heights} m, {machs}"]
         for name in self.names:
             real = self[name].real
             if np.all(np.isnan(real)):
@@ -98,7 +99,32 @@ class ModeSweep:
         if self.refused:
             (height, mach), reason = next(iter(self.refused.items()))
             lines.append(f"  no flight at {len(self.refused)} points, such as Mach {mach:g} at {height:g} m: {reason}")
-        return "\n".join(lines)
+        return "\n".join([*lines, *(f"  note: {note}" for note in self.notes)])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, schema version 1; null where there is no such flight or mode."""
+
+        def plain(values: Array) -> list[list[float | None]]:
+            return [[float(x) if math.isfinite(x) else None for x in row] for row in values]
+
+        return {
+            "schema_version": 1,
+            "kind": "modes over Mach number and altitude",
+            "machs": self.machs.tolist(),
+            "altitudes_m": self.altitudes.tolist(),
+            "modes": {
+                name: {
+                    "real_1_s": plain(self[name].real),
+                    "imaginary_rad_s": plain(self[name].imag),
+                    "damping_ratio": plain(self.damping_ratio(name)),
+                }
+                for name in self.names
+            },
+            "notes": list(self.notes),
+            "refused": [
+                {"altitude_m": height, "mach": mach, "why": why} for (height, mach), why in self.refused.items()
+            ],
+        }
 
     def to_csv(self, path: str | Path) -> None:
         """One row a mode and point, in one step."""
@@ -138,6 +164,13 @@ class ModeSweep:
             axes[1].set_title(f"fainter: higher, {self.altitudes[0] / 1e3:g} to {self.altitudes[-1] / 1e3:g} km")
         axes[0].legend(fontsize="small")
         return figure
+
+
+def _extent(values: Array, name: str) -> str:
+    """In words: one altitude, 0; 3 Mach numbers from 0.6 to 0.9."""
+    if values.size == 1:
+        return f"one {name}, {values[0]:g}"
+    return f"{values.size} {name}s from {values[0]:g} to {values[-1]:g}"
 
 
 def sweep_modes(

@@ -23,6 +23,7 @@ from indicial.flightsim import (
     aircraft_modes,
     balanced_flight,
     missile_damping,
+    missile_mode_sweep,
     sweep_modes,
 )
 from indicial.flightsim.atmosphere import GAS_CONSTANT
@@ -54,10 +55,8 @@ def damping_of_run(
     InputError
         If the run lacks the stages `mrf`, `irm` or `rom`.
     """
-    given = Path(target)
-    case, folder = open_run(given.parent if given.name == "results.json" and given.is_file() else target)
-    context = Context(case, folder, 1, LogReporter(), finite_volume)
-    body = vehicle(context)
+    context = _context(target)
+    case, body = context.case, vehicle(context)
     derivatives, model = aerodynamics(context)
     air, height = _air(altitude, atmosphere(context))
     speed = case.flight_condition.speed
@@ -76,6 +75,31 @@ def damping_of_run(
         uncertainties={name: error for name, error in known.items() if name in NAMES},
         notes=(about, *_held(mach, case.condition.mach)),
     )
+
+
+def sweep_of_run(
+    target: str | Path, machs: Sequence[float], altitudes: Sequence[float], *, roll_rate: float | None = None
+) -> ModeSweep:
+    """Modes of the missile of a run over Mach number and altitude [m] in the standard atmosphere.
+
+    The derivatives stay those of the run. The roll rate [rad/s] is the case's if not given.
+    """
+    context = _context(target)
+    derivatives, _ = aerodynamics(context)
+    spin = math.radians(context.case.flight.roll_rate_deg_s) if roll_rate is None else roll_rate
+    swept = missile_mode_sweep(vehicle(context), derivatives, machs, altitudes, roll_rate=spin)
+    return replace(swept, notes=_kept(context.case.condition.mach))
+
+
+def _kept(mach: float) -> tuple[str, ...]:
+    return (f"derivatives are those of Mach {mach:.3g}, held over the sweep",)
+
+
+def _context(target: str | Path) -> Context:
+    """A run by its folder, case file or results."""
+    given = Path(target)
+    case, folder = open_run(given.parent if given.name == "results.json" and given.is_file() else target)
+    return Context(case, folder, 1, LogReporter(), finite_volume)
 
 
 def damping_of_aircraft(
@@ -97,10 +121,9 @@ def damping_of_aircraft(
     """
     file = read_aircraft(path)
     here = file.condition
-    own = ConstantAtmosphere(here.temperature_K, here.density_kg_m3 * GAS_CONSTANT * here.temperature_K)
+    own, own_mach = _own_air(file)
     air, height = _air(altitude, own)
     speed = here.speed_m_s
-    own_mach = speed / float(air_at(own, 0.0).speed_of_sound)
     if mach is not None or altitude is not None:
         number = own_mach if mach is None else _positive(mach)
         speed = number * float(air_at(air, height).speed_of_sound)
@@ -134,7 +157,14 @@ def sweep_of_aircraft(path: str | Path, machs: Sequence[float], altitudes: Seque
         flown = {"path_angle": math.radians(file.condition.path_angle_deg), "gravity": file.condition.gravity_m_s2}
         return aircraft_modes(balanced_flight(file.vehicle, loads, speed, atmosphere=air, altitude=altitude, **flown))
 
-    return sweep_modes(modes_at, machs, altitudes)
+    return replace(sweep_modes(modes_at, machs, altitudes), notes=_kept(_own_air(file)[1]))
+
+
+def _own_air(file: AircraftFile) -> tuple[ConstantAtmosphere, float]:
+    """The air of an aircraft file, and its Mach number in it."""
+    here = file.condition
+    own = ConstantAtmosphere(here.temperature_K, here.density_kg_m3 * GAS_CONSTANT * here.temperature_K)
+    return own, here.speed_m_s / float(air_at(own, 0.0).speed_of_sound)
 
 
 def _moved(file: AircraftFile, speed: float, density: float) -> BodyAxisAerodynamics:
