@@ -14,7 +14,14 @@ from indicial.conventions import ReferenceQuantities
 from indicial.errors import DivergenceError, InputError
 from indicial.flightsim import ALPHA, BodyAxisAerodynamics, InitialState, Signal, Vehicle, build_dynamics, fly
 from indicial.flightsim.signals import Schedule
-from indicial.identification import FlightRecord, Manoeuvre, Parameter, SensitivityModel, fit_manoeuvres
+from indicial.identification import (
+    FlightRecord,
+    Manoeuvre,
+    Parameter,
+    SensitivityModel,
+    fit_manoeuvres,
+    maximum_likelihood,
+)
 from indicial.identification.coloured import autocorrelations, predictors, whiten
 from indicial.identification.maximum_likelihood import Problem
 from indicial.identification.start_state import StartState
@@ -453,3 +460,11 @@ def test_a_range_model_is_seen_through_the_same_channels():
     model = SensitivityModel.of(dynamics, ("x", "yaw", "pitch"))
     state = dynamics.initial_vector(InitialState.from_path(686.0, alpha=0.02))
     assert model.view(state, ())[:3] == pytest.approx([0.0, 0.0, 0.02])
+
+
+def test_noise_that_has_not_settled_is_told(monkeypatch):
+    """Cut off after one round, in which colour is found for the first time."""
+    m = manoeuvre(simulated(4, 0.9))
+    assert not any("settled" in finding for finding in fit_manoeuvres([m], parameters()).findings)
+    monkeypatch.setattr(maximum_likelihood, "_ROUNDS", 1)
+    assert any("not settled" in finding for finding in fit_manoeuvres([m], parameters()).findings)

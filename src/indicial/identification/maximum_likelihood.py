@@ -19,7 +19,7 @@ import math
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,7 @@ _MAX_STEPS = 80
 _MAX_DAMPING = 1e9
 _SETTLED = 1e-3  # relative change of the noise
 _ROUNDS = 12
+_UNSETTLED = f"the estimate of the noise had not settled after {_ROUNDS} rounds: standard errors are less sure"
 _NO_EFFECT = 1e-6  # standard deviations
 _LEAST_NOISE = 1e-3  # of the stated
 _LONG = 0.5  # of a step, in radians of the fastest motion; from 0.9 on estimates move by a third of their errors
@@ -247,12 +248,14 @@ def fit_manoeuvres(
         _check_effects(problem, point, noise)
         cost: list[float] = []
         point = minimise(problem, point, noise, cost)
+        settled = not estimate_noise
         for _ in range(_ROUNDS if estimate_noise else 0):
             before, noise = noise, estimated_noise(problem, point, noise, colour)
             point = minimise(problem, point, noise, cost)
-            if _settled(before, noise):
+            if settled := _settled(before, noise):
                 break
-        return _result(problem, point, noise, tuple(cost))
+        found = _result(problem, point, noise, tuple(cost))
+        return found if settled else replace(found, findings=(*found.findings, _UNSETTLED))
 
 
 @dataclass(frozen=True)
