@@ -215,6 +215,13 @@ def test_results_read_well():
         result["CZ_q"]
 
 
+def test_without_regressors_the_coefficient_is_its_mean():
+    record = manoeuvre()
+    (constant,) = equation_error(record, PLANE, "Cm", ()).estimates
+    assert constant.name == "Cm_0"
+    assert constant.value == pytest.approx(np.nanmean(aerodynamic_coefficient(record, PLANE, "Cm")), rel=1e-12)
+
+
 DEAD = np.full(400, np.nan)
 
 
@@ -227,8 +234,8 @@ DEAD = np.full(400, np.nan)
         ({"az": DEAD}, {}, "channel az of the flight record has no data"),
         ({"az": np.zeros(400)}, {"coefficient": "CZ"}, "CZ does not change in the record"),
         ({}, {"regressors": ("aoa",)}, "lacks aoa; it has V, dynamic_pressure"),
-        ({}, {"regressors": ()}, "at least one and each once, not none"),
-        ({}, {"regressors": ("alpha", "alpha")}, "each once, not alpha, alpha"),
+        ({}, {"regressors": (), "band": (0.1, 2.0)}, "in a band needs at least one regressor"),
+        ({}, {"regressors": ("alpha", "alpha")}, "once each, not alpha, alpha"),
         ({}, {"regressors": ("alpha^-1",)}, "must be a whole number from 1, not '-1'"),
         ({}, {"coefficient": "CM"}, "'CM' is none of CX, CY"),
         ({}, {"band": (0.0, 2.0)}, "must lie within 0 and 20 Hz"),

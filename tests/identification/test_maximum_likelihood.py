@@ -16,11 +16,14 @@ from indicial.flightsim import ALPHA, BodyAxisAerodynamics, InitialState, Signal
 from indicial.flightsim.signals import Schedule
 from indicial.identification import (
     FlightRecord,
+    Installation,
     Manoeuvre,
     Parameter,
     SensitivityModel,
+    Sensor,
     fit_manoeuvres,
     maximum_likelihood,
+    measure_flight,
 )
 from indicial.identification.coloured import autocorrelations, predictors, whiten
 from indicial.identification.maximum_likelihood import Problem
@@ -468,3 +471,20 @@ def test_noise_that_has_not_settled_is_told(monkeypatch):
     assert not any("settled" in finding for finding in fit_manoeuvres([m], parameters()).findings)
     monkeypatch.setattr(maximum_likelihood, "_ROUNDS", 1)
     assert any("not settled" in finding for finding in fit_manoeuvres([m], parameters()).findings)
+
+
+def test_instruments_at_their_place_show_what_a_measured_flight_has_there():
+    """A rolling, sideslipping flight: accelerometers and vanes off the centre of gravity, upwash and sidewash."""
+    vehicle = aircraft().vehicle
+    place = Installation((0.4, -0.2, 0.3), (2.0, 0.5, -0.4), upwash=1.1, sidewash=0.95)
+    start = InitialState.from_path(60.0, alpha=0.05, beta=0.03, rate=(0.4, 0.1, -0.2))
+    schedule = Signal(np.linspace(0.0, 4.0, 5), 0.02 * np.array([0.0, 1.0, -1.0, 1.0, 0.0]))
+    flight = fly(aircraft(), start, 4.0, method="rk4", step=0.01, parameters={**TRUTH, "elevator": schedule})
+    seen = ("V", "alpha", "beta", "p", "q", "r", "ax", "ay", "az", "dynamic_pressure")
+    sensors = {name: Sensor(100.0) for name in seen}
+    record = measure_flight(flight, vehicle, sensors, seed=None, inputs={"elevator": schedule}, installation=place)
+    m = Manoeuvre.of_flight(record, aircraft(), start, channels=seen, known=TRUTH, installation=place)
+    values, drive = m.schedule([])
+    shown = m.fly(values, drive, np.full(values.size, -1, dtype=np.int64), np.zeros(0)).outputs
+    for i, name in enumerate(seen):
+        np.testing.assert_allclose(shown[:, i], record[name], rtol=1e-9, atol=1e-9, err_msg=name)

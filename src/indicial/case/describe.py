@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from types import NoneType
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen, MultipleOf
@@ -36,7 +37,7 @@ def allowed(key: str, field: FieldInfo) -> str:
     """Type, unit and bounds of a key in words."""
     if _section(field):
         return f"a table [{key}] with {', '.join(_keys(field))}"
-    kind, bounds = field.annotation, field.metadata
+    kind, bounds = _given(field.annotation), field.metadata
     if get_origin(kind) is dict:
         return (
             f"a table [{key}] of names and {_value('', *_unpacked(get_args(kind)[1])).replace('a number', 'numbers')}"
@@ -45,6 +46,12 @@ def allowed(key: str, field: FieldInfo) -> str:
         (item,) = get_args(kind)
         return f"a list, each {_value(key, *_unpacked(item))}"
     return _value(key, kind, bounds)
+
+
+def _given(kind: Any) -> Any:
+    """The type of a value that may be left out: X of ``X | None``."""
+    inner = [one for one in get_args(kind) if one is not NoneType]
+    return inner[0] if NoneType in get_args(kind) and len(inner) == 1 else kind
 
 
 def _unpacked(kind: Any) -> tuple[Any, list[Any]]:
@@ -89,7 +96,7 @@ def _tables(path: str, field: FieldInfo) -> str:
 
 
 def _row(key: str, field: FieldInfo) -> str:
-    default = "required" if field.is_required() else f"`{field.default}`"
+    default = "required" if field.is_required() else "-" if field.default is None else f"`{field.default}`"
     return f"| `{key}` | {allowed(key, field)} | {default} | {field.description} |"
 
 

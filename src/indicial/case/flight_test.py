@@ -27,7 +27,10 @@ class Instruments(Section):
 class Air(Section):
     """The standard atmosphere of the day; altitude is that of the records where they have it."""
 
-    altitude_m: Annotated[float, Field(ge=-5e3, le=86e3, description="of records without altitude")] = 0.0
+    altitude_m: Annotated[
+        float | None,
+        Field(ge=-5e3, le=86e3, description="of records without; by default that of the density in the record, or 0"),
+    ] = None
     temperature_offset_K: Annotated[float, Field(gt=-80.0, lt=80.0, description="warmer than standard by")] = 0.0
 
 

@@ -9,6 +9,7 @@ import casadi as ca
 
 from indicial.errors import InputError
 from indicial.flightsim import Dynamics
+from indicial.identification.instruments import Installation
 
 _BODY_RATES = ("p", "q", "r")
 _SPECIFIC = ("ax", "ay", "az")
@@ -19,11 +20,18 @@ ANGLES = ("alpha", "beta", "theta", "pitch", *_TURNS)
 
 
 def channel_expressions(
-    dynamics: Dynamics, channels: Sequence[str], state: Any, parameters: Any, time: Any
+    dynamics: Dynamics,
+    channels: Sequence[str],
+    state: Any,
+    parameters: Any,
+    time: Any,
+    installation: Installation | None = None,
 ) -> list[Any]:
     """The channels, in the order asked for; names and units are those of `FlightRecord` and `RangeRecord`.
 
-    Specific force is ``vdot + (omega + Omega) x v - omega x cdot - R^T g``: all that acts but gravity, over mass.
+    Specific force is ``vdot + (omega + Omega) x v - omega x cdot - R^T g``: all that acts but gravity, over mass; at a
+    place r from the centre of gravity ``omegadot x r + omega x (omega x r)`` more, and the air there ``omega x r``.
+    Without an installation all is at the centre of gravity.
 
     Raises
     ------
@@ -33,19 +41,22 @@ def channel_expressions(
     r = rotation(state[6:10] / ca.norm_2(state[6:10]))
     _, _, _, sound, wind = dynamics.loads(state, parameters, time)
     density = dynamics.loads(state, parameters, time)[2]
-    through_air = state[3:6] - wind
+    place, omega = Installation() if installation is None else installation, state[10:13]
+    through_air = state[3:6] - wind + ca.cross(omega, ca.DM(place.vanes))
     speed = ca.norm_2(through_air)
     change = dynamics.derivative(state, parameters, time)
     earth_rate = ca.mtimes(r.T, ca.DM(dynamics.earth.rotation))
     gravity = ca.mtimes(r.T, dynamics.earth.gravity(state[:3]))
     felt = change[3:6] + ca.cross(state[10:13] + earth_rate, state[3:6]) - gravity
-    felt -= ca.cross(state[10:13], _drift(dynamics, parameters, time))
+    felt -= ca.cross(omega, _drift(dynamics, parameters, time))
+    arm = ca.DM(place.accelerometers)
+    felt += ca.cross(change[10:13], arm) + ca.cross(omega, ca.cross(omega, arm))
     seen = {
         **{name: state[i] for i, name in enumerate("xyz")},
         "altitude": dynamics.altitude(state),
         "V": speed,
-        "alpha": ca.atan2(through_air[2], through_air[0]),
-        "beta": ca.asin(through_air[1] / speed),
+        "alpha": place.upwash * ca.atan2(through_air[2], through_air[0]),
+        "beta": place.sidewash * ca.asin(through_air[1] / speed),
         "mach": speed / sound,
         "dynamic_pressure": 0.5 * density * speed**2,
         **{name: state[10 + i] for i, name in enumerate(_BODY_RATES)},

@@ -101,6 +101,12 @@ class Compatibility:
             channels[name] = made
         return replace(self.record, channels=channels)
 
+    @property
+    def biased(self) -> tuple[str, ...]:
+        """Channels whose bias `corrected` takes out."""
+        seen = [e.name.removeprefix("bias_") for e in self.errors if e.name.startswith("bias_")]
+        return tuple(name for name in seen if self._sure(f"bias_{name}") is not None)
+
     def _sure(self, name: str) -> float | None:
         for estimate in self.errors:
             if estimate.name == name and _differs(estimate, len(self.errors)):

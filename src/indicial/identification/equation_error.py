@@ -175,6 +175,7 @@ def equation_error(
         One of CX CY CZ CA CN Cl Cm Cn.
     regressors : sequence of str
         As `regressor` reads them: ``alpha``, ``q`` (dimensionless), ``elevator``, ``alpha^2``, ``alpha*elevator``.
+        None, in time: the coefficient is a constant.
     band : tuple of float, optional
         Lowest and highest frequency [Hz]; the record must be evenly sampled without dropouts.
     thrust : array_like
@@ -210,6 +211,8 @@ def equation_error(
     else:
         if leave_out_outliers:
             raise InputError("outliers can be left out in time only: a band needs every sample")
+        if not regressors:
+            raise InputError("equation error in a band needs at least one regressor: the constant is left out there")
         axis, measured, transforms = _transformed(record, response, columns, known, band, regressors)
         stacked = np.concatenate([transforms.real, transforms.imag])
         values, inverse = solve(stacked, np.concatenate([measured.real, measured.imag]))
@@ -253,13 +256,14 @@ def read_equation(
     record: FlightRecord, vehicle: Vehicle, coefficient: str, regressors: Sequence[str], thrust: ArrayLike = 0.0
 ) -> tuple[Array, Array]:
     """The coefficient (n,) and its regressors (n, p) at every sample, NaN where unknown."""
-    if not regressors or len(set(regressors)) < len(regressors):
-        raise InputError(f"regressors must be at least one and each once, not {', '.join(regressors) or 'none'}")
+    if len(set(regressors)) < len(regressors):
+        raise InputError(f"regressors must be there once each, not {', '.join(regressors)}")
     response = aerodynamic_coefficient(record, vehicle, coefficient, thrust=thrust)
     known = response[np.isfinite(response)]
     if known.size and np.ptp(known) == 0.0:
         raise InputError(f"{coefficient} does not change in the record: is a channel of it dead?")
-    return response, np.column_stack([regressor(record, name, vehicle.reference) for name in regressors])
+    columns = [regressor(record, name, vehicle.reference) for name in regressors]
+    return response, np.stack(columns, axis=1) if columns else np.zeros((response.size, 0))
 
 
 def _transformed(

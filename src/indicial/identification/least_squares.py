@@ -34,6 +34,8 @@ def check_regressors(names: Sequence[str], columns: Array) -> None:
     for name, one, whole in zip(names, size, np.linalg.norm(columns, axis=0), strict=True):
         if one <= 1e-12 * whole:
             raise InputError(f"regressor {name} does not change in the record, so its effect cannot be identified")
+    if not names:
+        return
     _, singular, rows = np.linalg.svd(centred / size, full_matrices=False)
     if singular[-1] <= 1e-10 * singular[0]:
         together = [name for name, part in zip(names, rows[-1], strict=True) if abs(part) > 0.1]

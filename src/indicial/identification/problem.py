@@ -13,6 +13,7 @@ from indicial.errors import InputError
 from indicial.flightsim import Dynamics, InitialState, Signal
 from indicial.flightsim.march import Drive
 from indicial.flightsim.signals import Schedule
+from indicial.identification.instruments import Installation
 from indicial.identification.measurement import RangeRecord
 from indicial.identification.reading import check_size
 from indicial.identification.record import FlightRecord
@@ -103,6 +104,7 @@ class Manoeuvre:
         biases: Sequence[str] = (),
         segments: int = 1,
         steps_per_interval: int = 1,
+        installation: Installation | None = None,
         model: SensitivityModel | None = None,
         name: str = "record",
     ) -> Manoeuvre:
@@ -127,6 +129,9 @@ class Manoeuvre:
             that a wrong start of the parameters cannot carry an unstable flight away.
         steps_per_interval : int
             Runge-Kutta steps from instant to instant.
+        installation : Installation, optional
+            Where the instruments are, at the centre of gravity if not given: the model then shows what they feel there,
+            and angular accelerations need no slopes.
         model : SensitivityModel, optional
             If it is compiled already.
 
@@ -142,7 +147,7 @@ class Manoeuvre:
                 check_size(channel, record[channel], name)
         if segments < 1 or steps_per_interval < 1:
             raise InputError("segments and steps_per_interval must be at least 1")
-        built = SensitivityModel.of(dynamics, seen, biases) if model is None else model
+        built = SensitivityModel.of(dynamics, seen, biases, installation) if model is None else model
         stated = [record.standard_deviations.get(c) or _roughness(c, record[c]) for c in seen]
         inputs = {n: Signal(record.time, record.inputs[n]) for n in record.inputs if n in built.parameter_names}
         start = StartState.of(dynamics, initial, free_start)

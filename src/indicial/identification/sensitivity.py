@@ -31,6 +31,7 @@ from indicial.flightsim import Dynamics
 from indicial.flightsim.compiled import Code, Kernel, compile_function, evaluate_code
 from indicial.flightsim.march import Drive, feed
 from indicial.identification.channels import channel_expressions
+from indicial.identification.instruments import Installation
 
 BIAS = "bias_"
 """A parameter of this name and a channel's is added to what the channel sees."""
@@ -72,8 +73,14 @@ class SensitivityModel:
     view_pattern: Pattern
 
     @classmethod
-    def of(cls, dynamics: Dynamics, channels: Sequence[str], biases: Sequence[str] = ()) -> SensitivityModel:
-        """Compile a model that sees some channels, of which some have a bias.
+    def of(
+        cls,
+        dynamics: Dynamics,
+        channels: Sequence[str],
+        biases: Sequence[str] = (),
+        installation: Installation | None = None,
+    ) -> SensitivityModel:
+        """Compile a model that sees some channels, of which some have a bias, from where the instruments are.
 
         Raises
         ------
@@ -87,7 +94,7 @@ class SensitivityModel:
         state, time = ca.SX.sym("state", len(dynamics.state_names)), ca.SX.sym("time")
         parameters = ca.SX.sym("parameters", n + len(biases))
         own = parameters[:n]
-        seen = channel_expressions(dynamics, channels, state, own, time)
+        seen = channel_expressions(dynamics, channels, state, own, time, installation)
         for i, name in enumerate(biases):
             seen[channels.index(name)] += parameters[n + i]
         inputs = [state, parameters, time]

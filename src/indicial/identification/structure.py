@@ -109,6 +109,8 @@ def model_structure(
     InputError
         As `equation_error`, or if no candidate explains anything.
     """
+    if not candidates:
+        raise InputError("a model structure is chosen from at least one candidate")
     response, columns = read_equation(record, vehicle, coefficient, candidates, thrust)
     known = np.isfinite(response) & np.all(np.isfinite(columns), axis=1)
     if np.count_nonzero(known) < 2 * (len(candidates) + 1):
