@@ -7,6 +7,7 @@ import re
 import shutil
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 import pytest
 from scipy.stats import binom
@@ -15,6 +16,7 @@ from typer.testing import CliRunner
 from indicial.case import read_flight_test
 from indicial.cli import app
 from indicial.errors import DivergenceError, InputError
+from indicial.flightsim import Motor, Signal
 from indicial.identification import Installation
 from indicial.pipeline.flight_test import reduce_flight_test
 from indicial.reference_data import find_flight_test
@@ -165,6 +167,35 @@ def test_altitude_that_was_not_measured_is_that_of_the_density(tmp_path):
 def test_a_fit_that_fails_tells_what_was_found_of_the_records(tmp_path):
     with pytest.raises(DivergenceError, match=r"of the records, light_aircraft_pitch: theta changes 57.* in degrees\?"):
         reduce_flight_test(with_columns(tmp_path, "Q [", lambda cell, row: f"{float(cell) * math.pi / 180.0}"))
+
+
+def test_thrust_of_a_record_is_a_force_and_no_control(tmp_path, monkeypatch):
+    """An engine that is opened in the middle of the manoeuvre: CX stays what it was."""
+    maker = made_by()
+    plain, fly, measure = maker.term_model, maker.fly, maker.measure_flight
+    push = Signal(np.array([0.0, 4.0, 5.0, 12.0]), np.array([500.0, 500.0, 2500.0, 2500.0]))
+    motor = Motor(ca.SX.sym("thrust"), maker.VEHICLE.centre_of_gravity)
+    monkeypatch.setattr(maker, "term_model", lambda *given: plain(*given, [motor]))
+    monkeypatch.setattr(
+        maker, "fly", lambda *given, parameters, **how: fly(*given, parameters={**parameters, "thrust": push}, **how)
+    )
+    monkeypatch.setattr(
+        maker,
+        "measure_flight",
+        lambda flight, *given, **how: measure(flight, *given, thrust=push.at(flight.time), **how),
+    )
+    file = maker.write_files(tmp_path)
+    for table in ("light_aircraft_pitch.csv", "light_aircraft_roll.csv"):
+        head, *rows = (tmp_path / table).read_text().splitlines()
+        rows = [f"{row},{push.at(float(row.split(',')[0]) / 1000.0) / 1000.0:.6f}" for row in rows]
+        (tmp_path / table).write_text("\n".join([f"{head},T [kN]", *rows]))
+    with (tmp_path / "light_aircraft_map.toml").open("a") as stream:
+        stream.write('\n[inputs.thrust]\ncolumn = "T [kN]"\nunit = "kN"\n')
+    found = reduce_flight_test(file)
+    holds(found)
+    for one in found.records:
+        estimate = one.equation_errors["CX"]["CX_0"]
+        assert abs(estimate.value - TRUTH["CX_0"]) < 5.0 * estimate.standard_error
 
 
 @pytest.mark.slow

@@ -15,7 +15,17 @@ from typing import Any
 import casadi as ca
 
 from indicial.errors import InputError
-from indicial.flightsim import ALPHA, BETA, MACH, Atmosphere, BodyAxisAerodynamics, Dynamics, Vehicle, build_dynamics
+from indicial.flightsim import (
+    ALPHA,
+    BETA,
+    MACH,
+    Atmosphere,
+    BodyAxisAerodynamics,
+    Dynamics,
+    Force,
+    Vehicle,
+    build_dynamics,
+)
 
 LONGITUDINAL, LATERAL = ("CX", "CZ", "Cm"), ("CY", "Cl", "Cn")
 _RATES: Mapping[str, tuple[str, ...]] = {
@@ -37,6 +47,7 @@ def term_model(
     terms: Mapping[str, Sequence[str]],
     controls: Sequence[str] = (),
     atmosphere: Atmosphere | None = None,
+    forces: Sequence[Force] = (),
 ) -> Dynamics:
     """Equations of motion whose parameters are the coefficients of the terms, and the controls.
 
@@ -50,7 +61,8 @@ def term_model(
     controls : sequence of str
         Names that terms may use besides those of the motion.
     atmosphere : Atmosphere, optional
-        As in `build_dynamics`.
+        As in `build_dynamics`, and
+    forces : sequence of Force
 
     Raises
     ------
@@ -69,7 +81,9 @@ def term_model(
             rate, product = ("0", ca.SX(1.0)) if term == "0" else _factors(name, term, symbols)
             field = f"{name}_{rate}"
             values[field] = values.get(field, 0.0) + ca.SX.sym(f"{name}_{term}") * product
-    return build_dynamics(vehicle, BodyAxisAerodynamics(reference=vehicle.reference, **values), atmosphere)
+    return build_dynamics(
+        vehicle, BodyAxisAerodynamics(reference=vehicle.reference, **values), atmosphere, forces=forces
+    )
 
 
 def _factors(name: str, term: str, controls: Mapping[str, Any]) -> tuple[str, Any]:

@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import casadi as ca
 import numpy as np
 from scipy.optimize import brentq
 
 from indicial.case import FlightTest, read_flight_test
 from indicial.conventions import Array
 from indicial.errors import DivergenceError, IndicialError, InputError
-from indicial.flightsim import Dynamics, InitialState, StandardAtmosphere, air_at
+from indicial.flightsim import Dynamics, InitialState, Motor, StandardAtmosphere, air_at
 from indicial.identification import (
     Compatibility,
     EquationError,
@@ -37,6 +38,9 @@ from indicial.identification import (
     to_centre_of_gravity,
 )
 from indicial.pipeline.progress import LogReporter, Reporter
+
+THRUST = "thrust"
+"""The input of a map that is a force [N] along x through the centre of gravity, and no control."""
 
 _IN_PLANE = ("V", "alpha", "theta", "q", "ax", "az")
 _OUT_OF_PLANE = ("beta", "phi", "p", "r", "ay")
@@ -220,7 +224,12 @@ def _reduced(test: FlightTest, raw: FlightRecord, name: str) -> ReducedRecord:
     for coefficient, terms in test.terms.items():
         try:
             fits[coefficient] = equation_error(
-                record, test.vehicle, coefficient, [t for t in terms if t != "alphadot"], leave_out_outliers=True
+                record,
+                test.vehicle,
+                coefficient,
+                [t for t in terms if t != "alphadot"],
+                thrust=record.inputs.get(THRUST, 0.0),
+                leave_out_outliers=True,
             )
         except InputError as error:
             notes.append(f"no equation error of {coefficient}: {error}")
@@ -309,7 +318,9 @@ def _height(test: FlightTest, record: FlightRecord, notes: list[str]) -> float:
 def _fitted(test: FlightTest, records: tuple[ReducedRecord, ...]) -> FlightTestResult:
     """Output error of all records together, from what equation error says."""
     controls = tuple(dict.fromkeys(name for one in records for name in one.record.inputs))
-    dynamics = term_model(test.vehicle, test.terms, controls, _atmosphere(test))
+    motors = [Motor(ca.SX.sym(THRUST), test.vehicle.centre_of_gravity)] if THRUST in controls else []
+    deflections = [name for name in controls if name != THRUST]
+    dynamics = term_model(test.vehicle, test.terms, deflections, _atmosphere(test), motors)
     manoeuvres: list[Manoeuvre] = []
     biases = _biases(test, records)
     for one in records:
